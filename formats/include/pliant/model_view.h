@@ -1,0 +1,54 @@
+// model_view.h: the sections of a model file as typed arrays whose every index has been checked.
+//
+// Bind is the one place that distrusts a model file: afterwards shapes agree with each other, every
+// index is in range and every number finite. The topology of the levels is checked by
+// pliant_hierarchy_create, which the caller runs on faces and parents. Pointers are borrowed until
+// the reader is closed.
+#pragma once
+
+#include "pliant/reader.h"
+
+// The columns of one level of one block: wavelet coefficients of the row domain (FORMULAS 3).
+typedef struct pliant_greens_view {
+    int32_t row_count;             // positions of the row domain: m or k
+    int32_t column_count;          // column c belongs to position c of the column domain
+    uint64_t nnz;                  // stored blocks
+    const uint64_t *column_offset; // shape [column_count + 1]; NULL: this level is not stored
+    const int32_t *row;            // shape [nnz], ascending within a column
+    const float *block;            // shape [nnz][3][3]: component r per unit component c
+    const double *summary;         // shape [PLIANT_SUMMARY_COUNT]
+} pliant_greens_view;
+
+typedef struct pliant_model_view {
+    int32_t vertex_count;  // n
+    int32_t face_count;    // nf
+    int32_t level_count;   // L + 1
+    int32_t free_count;    // m
+    int32_t fixed_count;   // k
+    int32_t has_supports;  // 1: the fixed blocks and gravity_fixed are stored
+    uint64_t provenance_bytes;
+
+    // One pointer per row of PLIANT_MODEL_SECTIONS:
+    const double *vertices;             // [n][3]
+    const int32_t *faces;               // [nf][3], finest level, children order of hierarchy.h
+    const int32_t *level_vertex_count;  // [L + 1], |K(l)|
+    const int32_t *parents;             // [n - n0][2]
+    const int32_t *source_index;        // [n], -1: made by subdivision
+    const double *material;             // [3] young, poisson, density
+    const int32_t *free_nodes;          // [m], ascending
+    const int32_t *free_level_offset;   // [L + 2]
+    const int32_t *fixed_nodes;         // [k], ascending
+    const int32_t *fixed_level_offset;  // [L + 2]
+    const float *gravity_free;          // [m][3][3], transformed, per unit acceleration
+    const float *gravity_fixed;         // [k][3][3]; NULL without supports
+    const unsigned char *provenance;    // [provenance_bytes], "key = value" lines, no NUL at the end
+
+    pliant_greens_view greens[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+} pliant_model_view;
+
+// Fill `view`, or refuse with the section, the element, what was expected and what was found.
+// PLIANT_ERR_MISSING: not a model file (a dense file, say), or a section is absent. On refusal
+// `view` is unchanged.
+PLIANT_UNUSED_RESULT pliant_status pliant_model_view_bind(const pliant_reader *reader,
+                                                          pliant_model_view *view,
+                                                          pliant_error *err);

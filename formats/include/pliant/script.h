@@ -1,0 +1,76 @@
+// script.h: the contact script language, one statement a line (see formats/README.md).
+//
+// The parser knows the language, not the model: vertex numbers are checked for form here and for
+// meaning by whoever runs the statement. It holds one line at a time, whatever the file's length.
+#pragma once
+
+#include "pliant/base.h"
+
+#include <stddef.h>
+
+#define PLIANT_SCRIPT_VERSION     1
+#define PLIANT_SCRIPT_NAME_LIMIT  64    // bytes of a probe's name, with its end
+#define PLIANT_SCRIPT_LINE_LIMIT  4096  // bytes of a line
+
+typedef enum pliant_statement_kind {
+    PLIANT_STATEMENT_NONE,      // blank or comment
+    PLIANT_STATEMENT_VERSION,   // pliant-script 1
+    PLIANT_STATEMENT_PROBE,     // probe NAME vertex VERTEX | probe NAME near X Y Z
+    PLIANT_STATEMENT_DISPLACE,  // displace VERTEX X Y Z
+    PLIANT_STATEMENT_TRACTION,  // traction VERTEX X Y Z
+    PLIANT_STATEMENT_FORCE,     // force VERTEX X Y Z
+    PLIANT_STATEMENT_SUPPORT,   // support VERTEX X Y Z
+    PLIANT_STATEMENT_GRAVITY,   // gravity X Y Z
+    PLIANT_STATEMENT_RELEASE,   // release VERTEX | release all
+    PLIANT_STATEMENT_DT,        // dt SECONDS
+    PLIANT_STATEMENT_STEP,      // step [COUNT]
+    PLIANT_STATEMENT_EXPECT,    // expect NAME X Y Z TOLERANCE
+} pliant_statement_kind;
+
+typedef enum pliant_vertex_kind {
+    PLIANT_VERTEX_NONE,
+    PLIANT_VERTEX_MODEL,   // K: number in the model, finest level
+    PLIANT_VERTEX_LEVEL,   // L:K: the hierarchical basis function of vertex K on level L
+    PLIANT_VERTEX_SOURCE,  // source K: number in the input mesh
+    PLIANT_VERTEX_NEAR,    // near X Y Z: the free vertex nearest to a rest position
+    PLIANT_VERTEX_ALL,     // all (release only)
+} pliant_vertex_kind;
+
+// VERTEX may be any of K, L:K, source K, near X Y Z.
+typedef struct pliant_vertex_name {
+    pliant_vertex_kind kind;
+    int32_t level, number;
+    double position[3];
+} pliant_vertex_name;
+
+typedef struct pliant_statement {
+    pliant_statement_kind kind;
+    int64_t line;                // 1-based
+    int32_t column;              // 1-based, of the statement's first argument (for later messages)
+    char name[PLIANT_SCRIPT_NAME_LIMIT];
+    pliant_vertex_name vertex;
+    double value[3];             // finite
+    double scalar;               // tolerance of expect, seconds of dt; finite
+    int64_t count;               // of step; version of pliant-script
+} pliant_statement;
+
+typedef struct pliant_script pliant_script;  // an open script: a stream, its name and line number
+
+// Open a file, or standard input for "-". Close takes NULL.
+PLIANT_UNUSED_RESULT pliant_status pliant_script_open(const char *path, pliant_script **script,
+                                                      pliant_error *err);
+void pliant_script_close(pliant_script *script);
+
+// Read on to the next statement that is not blank. *more is 0 at the end of the script. Refusals
+// read "name:line:column: expected ..., found ..." and leave the parser at the next line.
+PLIANT_UNUSED_RESULT pliant_status pliant_script_next(pliant_script *script,
+                                                      pliant_statement *statement, int *more,
+                                                      pliant_error *err);
+
+// Parse one line (no line break, not necessarily NUL-terminated); what script_next and the fuzzer
+// call. `name` and `line` are for messages. `first` is 1 until a version statement was seen: the
+// first statement must be one.
+PLIANT_UNUSED_RESULT pliant_status pliant_statement_parse(const char *text, size_t length,
+                                                          const char *name, int64_t line, int first,
+                                                          pliant_statement *statement,
+                                                          pliant_error *err);

@@ -1,0 +1,241 @@
+// test_statement.c: every statement of the contact script language, and every kind of mistake.
+#include "check.h"
+
+#include "pliant/script.h"
+#include "utf8.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static pliant_statement parse_at(const char *text, size_t length, int first, pliant_status expected,
+                                 pliant_error *err)
+{
+    pliant_statement s = {.kind = PLIANT_STATEMENT_NONE};
+    // An exact copy: the line has no NUL at its end.
+    char *copy = malloc(length > 0 ? length : 1);
+    assert_non_null(copy);
+    memcpy(copy, text, length);
+    strcpy(err->text, "");
+    const pliant_status status = pliant_statement_parse(copy, length, "s", 7, first, &s, err);
+    free(copy);
+    if (status != expected) fail_msg("\"%.200s\": status %d, %s", text, status, err->text);
+    return s;
+}
+
+static pliant_statement parse(const char *text)
+{
+    pliant_error err;
+    return parse_at(text, strlen(text), 0, PLIANT_OK, &err);
+}
+
+static void check_refused(const char *text, const char *message)
+{
+    pliant_error err;
+    parse_at(text, strlen(text), 0, PLIANT_ERR_FORMAT, &err);
+    assert_string_equal(err.text, message);
+}
+
+static void every_statement_is_understood(void **state)
+{
+    (void)state;
+    pliant_error err;
+    pliant_statement s = parse_at("pliant-script 1", 15, 1, PLIANT_OK, &err);
+    assert_int_equal(s.kind, PLIANT_STATEMENT_VERSION);
+    assert_int_equal(s.count, 1);
+    assert_int_equal(s.line, 7);
+    assert_int_equal(parse("").kind, PLIANT_STATEMENT_NONE);
+    assert_int_equal(parse(" \t ").kind, PLIANT_STATEMENT_NONE);
+    assert_int_equal(parse("# displace").kind, PLIANT_STATEMENT_NONE);
+    assert_int_equal(parse_at("  # before the version", 22, 1, PLIANT_OK, &err).kind, PLIANT_STATEMENT_NONE);
+
+    s = parse("probe nose vertex 812");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_PROBE);
+    assert_string_equal(s.name, "nose");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_MODEL);
+    assert_int_equal(s.vertex.number, 812);
+    assert_int_equal(s.column, 7);
+    s = parse("probe Nasenspitze-\xc3\xa4.1 vertex source 3");
+    assert_string_equal(s.name, "Nasenspitze-\xc3\xa4.1");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_SOURCE);
+    assert_int_equal(s.vertex.number, 3);
+    s = parse("\tprobe tip near 0.1 -2e-1 +1.3");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_NEAR);
+    check_near(s.vertex.position[1], -0.2, 0);
+    check_near(s.vertex.position[2], 1.3, 0);
+
+    s = parse("displace 812 0 0 -0.02   # push");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_DISPLACE);
+    assert_int_equal(s.vertex.number, 812);
+    check_near(s.value[2], -0.02, 0);
+    assert_int_equal(s.column, 10);
+    s = parse("displace 1:17 0 0 .5#glued");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_LEVEL);
+    assert_int_equal(s.vertex.level, 1);
+    assert_int_equal(s.vertex.number, 17);
+    check_near(s.value[2], 0.5, 0);
+    s = parse("traction near 1 2 3 4 5 6");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_TRACTION);
+    check_near(s.vertex.position[2], 3, 0);
+    check_near(s.value[0], 4, 0);
+    s = parse("force source 2147483647 1 1. 1E0");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_FORCE);
+    assert_int_equal(s.vertex.number, INT32_MAX);
+    assert_int_equal(parse("support 30 0 0 0.01").kind, PLIANT_STATEMENT_SUPPORT);
+    s = parse("gravity 0 0 -9.81");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_GRAVITY);
+    check_near(s.value[2], -9.81, 0);
+    assert_int_equal(parse("release 812").vertex.kind, PLIANT_VERTEX_MODEL);
+    assert_int_equal(parse("release all").vertex.kind, PLIANT_VERTEX_ALL);
+    check_near(parse("dt 1e-3").scalar, 0.001, 0);
+    assert_int_equal(parse("step").count, 1);
+    assert_int_equal(parse("step 100").count, 100);
+    assert_true(parse("step 9223372036854775807").count == INT64_MAX);
+    s = parse("expect nose 0 0 -0.02 1e-3");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_EXPECT);
+    check_near(s.scalar, 1e-3, 0);
+    check_near(parse("gravity 0 0 1e-400").value[2], 0, 0);
+}
+
+static void mistakes_are_placed_and_explained(void **state)
+{
+    (void)state;
+    check_refused("shove 1 2 3", "s:7:1: expected probe, displace, traction, force, support, gravity, "
+                                 "release, dt, step or expect, found \"shove\"");
+    check_refused("pliant-script 1", "s:7:1: expected pliant-script as first statement only, found \"pliant-script\"");
+    check_refused("displace", "s:7:9: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
+    check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"-1\"");
+    check_refused("displace 2147483648 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"2147483648\"");
+    check_refused("displace 1: 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"1:\"");
+    check_refused("displace 1:2:3 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"1:2:3\"");
+    check_refused("displace :2 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \":2\"");
+    check_refused("displace 12a 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"12a\"");
+    check_refused("displace source 0 0", "s:7:20: expected y, a number, found the end of the line");
+    check_refused("displace source x 0 0", "s:7:17: expected the number of a vertex of the input mesh, found \"x\"");
+    check_refused("displace 8 0 nan 0", "s:7:14: expected y, a number, found \"nan\"");
+    check_refused("displace 8 inf 0 0", "s:7:12: expected x, a number, found \"inf\"");
+    check_refused("displace 8 0 0 -INFINITY", "s:7:16: expected z, a number, found \"-INFINITY\"");
+    check_refused("displace 8 0x10 0 0", "s:7:12: expected x, a number, found \"0x10\"");
+    check_refused("displace 8 1e 0 0", "s:7:12: expected x, a number, found \"1e\"");
+    check_refused("displace 8 . 0 0", "s:7:12: expected x, a number, found \".\"");
+    check_refused("displace 8 1,5 0 0", "s:7:12: expected x, a number, found \"1,5\"");
+    check_refused("displace 8 1e400 0 0", "s:7:12: expected a number within +-3.4e38, found \"1e400\"");
+    check_refused("displace 8 0 -3.5e38 0", "s:7:14: expected a number within +-3.4e38, found \"-3.5e38\"");
+    check_refused("displace 8 0 0 0 0", "s:7:18: expected the end of the line, found \"0\"");
+    check_refused("gravity 0 0 1 please", "s:7:15: expected the end of the line, found \"please\"");
+    check_refused("release", "s:7:8: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
+    check_refused("release all 3", "s:7:13: expected the end of the line, found \"3\"");
+    check_refused("step 0", "s:7:6: expected a number of steps, 1 or more, found \"0\"");
+    check_refused("step -3", "s:7:6: expected a number of steps, 1 or more, found \"-3\"");
+    check_refused("step 9223372036854775808", "s:7:6: expected a number of steps, 1 or more, found \"9223372036854775808\"");
+    check_refused("step 2 3", "s:7:8: expected the end of the line, found \"3\"");
+    check_refused("dt 0", "s:7:4: expected seconds, a number > 0, found \"0\"");
+    check_refused("dt", "s:7:3: expected seconds, a number > 0, found the end of the line");
+    check_refused("expect nose 0 0 0", "s:7:18: expected a tolerance, a number >= 0, found the end of the line");
+    check_refused("expect nose 0 0 0 -1", "s:7:19: expected a tolerance, a number >= 0, found \"-1\"");
+    check_refused("probe", "s:7:6: expected a probe's name of letters, digits, _ - ., found the end of the line");
+    check_refused("probe a,b vertex 1", "s:7:7: expected a probe's name of letters, digits, _ - ., found \"a,b\"");
+    check_refused("probe nose 812", "s:7:12: expected vertex or near, found \"812\"");
+    check_refused("probe nose vertex", "s:7:18: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
+}
+
+static void columns_count_characters_not_bytes(void **state)
+{
+    (void)state;
+    check_refused("expect \xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80 0 0 0 x", "s:7:18: expected a tolerance, a number >= 0, found \"x\"");
+}
+
+static void first_statement_must_be_the_version(void **state)
+{
+    (void)state;
+    pliant_error err;
+    parse_at("step", 4, 1, PLIANT_ERR_FORMAT, &err);
+    assert_string_equal(err.text, "s:7:1: expected \"pliant-script 1\" as first statement, found \"step\"");
+    parse_at("pliant-script 2", 15, 1, PLIANT_ERR_VERSION, &err);
+    assert_string_equal(err.text, "s:7:15: expected version 1 of the language, the newest known here, found \"2\"");
+    parse_at("pliant-script 0", 15, 1, PLIANT_ERR_FORMAT, &err);
+    parse_at("pliant-script", 13, 1, PLIANT_ERR_FORMAT, &err);
+    parse_at("pliant-script 1 1", 17, 1, PLIANT_ERR_FORMAT, &err);
+}
+
+static void bytes_that_are_no_text_are_refused(void **state)
+{
+    (void)state;
+    pliant_error err;
+    parse_at("step 1\0 2", 9, 0, PLIANT_ERR_FORMAT, &err);
+    assert_string_equal(err.text, "s:7:7: expected UTF-8 text, found byte 0x00");
+    check_refused("step # \xff", "s:7:8: expected UTF-8 text, found byte 0xff");
+    check_refused("step\r", "s:7:5: expected UTF-8 text, found byte 0x0d");
+    check_refused("step \x1b[2J", "s:7:6: expected UTF-8 text, found byte 0x1b");
+    check_refused("# \xc0\x80", "s:7:3: expected UTF-8 text, found byte 0xc0");
+}
+
+static void long_words_and_lines_are_refused_in_one_short_line(void **state)
+{
+    (void)state;
+    static char line[PLIANT_SCRIPT_LINE_LIMIT + 2];
+    pliant_error err;
+    char name[80];
+    memset(name, 'n', 79);
+    name[79] = 0;
+    snprintf(line, sizeof line, "probe %.63s vertex 1", name);
+    assert_int_equal(strlen(parse(line).name), 63);
+    snprintf(line, sizeof line, "probe %.64s vertex 1", name);
+    check_refused(line, "s:7:7: expected a probe's name of at most 63 bytes, found \"nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn...\"");
+    memset(line, '0', sizeof line);
+    memcpy(line, "dt 1", 4);
+    line[3] = '.';
+    line[4] = '1';
+    check_near(parse_at(line, PLIANT_SCRIPT_LINE_LIMIT, 0, PLIANT_OK, &err).scalar, 0.1, 0);
+    parse_at(line, PLIANT_SCRIPT_LINE_LIMIT + 1, 0, PLIANT_ERR_FORMAT, &err);
+    assert_string_equal(err.text, "s:7:4097: expected a line of at most 4096 bytes, found more");
+    memset(line, 'x', sizeof line);
+    parse_at(line, PLIANT_SCRIPT_LINE_LIMIT, 0, PLIANT_ERR_FORMAT, &err);
+    assert_true(strlen(err.text) < 200);
+}
+
+static void refused_line_leaves_the_statement_as_it_was(void **state)
+{
+    (void)state;
+    pliant_statement s, before;
+    memset(&s, 0x5a, sizeof s);
+    before = s;
+    assert_int_equal(pliant_statement_parse("step x", 6, "s", 1, 0, &s, NULL), PLIANT_ERR_FORMAT);
+    assert_memory_equal(&s, &before, sizeof s);
+}
+
+// The table of RFC 3629, section 4: first and last of every row, and their neighbours outside.
+static void utf8_is_what_rfc_3629_says(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text;
+        int size;
+    } cases[] = {
+        {"\x01", 1}, {"\x7f", 1}, {"\x80", 0}, {"\xbf", 0}, {"\xc0\x80", 0}, {"\xc1\xbf", 0},
+        {"\xc2\x80", 2}, {"\xdf\xbf", 2}, {"\xc2", 0}, {"\xc2\x7f", 0}, {"\xc2\xc0", 0},
+        {"\xe0\x9f\xbf", 0}, {"\xe0\xa0\x80", 3}, {"\xed\x9f\xbf", 3}, {"\xed\xa0\x80", 0},
+        {"\xee\x80\x80", 3}, {"\xef\xbf\xbf", 3}, {"\xe2\x82", 0}, {"\xe2\x82\x7f", 0},
+        {"\xf0\x8f\xbf\xbf", 0}, {"\xf0\x90\x80\x80", 4}, {"\xf4\x8f\xbf\xbf", 4},
+        {"\xf4\x90\x80\x80", 0}, {"\xf5\x80\x80\x80", 0}, {"\xf0\x9f\x98", 0}, {"\xff", 0},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        assert_int_equal(pliant_utf8_character(cases[i].text, strlen(cases[i].text)), cases[i].size);
+    assert_int_equal(pliant_utf8_check("ab\xc3\xa4", 4), 4);
+    assert_int_equal(pliant_utf8_check("ab\xc3\xa4", 3), 2);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_statement_is_understood),
+        cmocka_unit_test(mistakes_are_placed_and_explained),
+        cmocka_unit_test(columns_count_characters_not_bytes),
+        cmocka_unit_test(first_statement_must_be_the_version),
+        cmocka_unit_test(bytes_that_are_no_text_are_refused),
+        cmocka_unit_test(long_words_and_lines_are_refused_in_one_short_line),
+        cmocka_unit_test(refused_line_leaves_the_statement_as_it_was),
+        cmocka_unit_test(utf8_is_what_rfc_3629_says),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
