@@ -1,0 +1,143 @@
+// main.c: pliant-precompute: from a mesh to a file of compressed Green's functions.
+#include "options.h"
+#include "refusal.h"
+#include "run.h"
+
+#include "pliant/sections.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char program[] = "pliant-precompute";
+
+enum { EXIT_DONE = 0, EXIT_FAILED = 1, EXIT_MISUSED = 2 };
+
+static double factor(const pliant_compression_result *r)
+{
+    return r->kept ? (double)r->dense / (double)r->kept : 0;
+}
+
+static void print_text(const pliant_options *options, const pliant_run_summary *s)
+{
+    printf("%s: %d vertices in %d levels, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
+           s->level_count, s->free_count, s->fixed_count, s->file_bytes / 1e6);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
+        const pliant_compression_result *r = &s->results[b];
+        if (r->dense == 0) continue;
+        printf("  %-12s %llu of %llu blocks kept, factor %.1f, RMS %.4f, MAX %.4f\n",
+               pliant_block_text((pliant_block_name)b), (unsigned long long)r->kept,
+               (unsigned long long)r->dense, factor(r), r->rms, r->max);
+    }
+    const pliant_run_times *t = &s->times;
+    printf("  seconds      read %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
+           "%.2f, write %.2f, total %.2f\n",
+           t->read, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+}
+
+static void print_json_text(const char *text)
+{
+    putchar('"');
+    for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
+        if (*c == '"' || *c == '\\') printf("\\%c", *c);
+        else if (*c < 0x20) printf("\\u%04x", *c);
+        else putchar(*c);
+    }
+    putchar('"');
+}
+
+static void print_json(const pliant_options *options, const pliant_run_summary *s)
+{
+    printf("{\"output\": ");
+    print_json_text(options->output);
+    printf(", \"vertices\": %d, \"faces\": %d, \"levels\": %d, \"free\": %d, \"fixed\": %d, \"components\": %d"
+           ", \"ranks\": %d, \"solver\": \"%s\", \"volume\": %.9g, \"residual\": %.3g, \"memory_bytes\": %.0f"
+           ", \"file_bytes\": %.0f, \"blocks\": {",
+           s->vertex_count, s->face_count, s->level_count, s->free_count, s->fixed_count, s->component_count,
+           s->ranks, s->solver, s->volume, s->residual, s->memory_bytes, s->file_bytes);
+    for (int b = 0, first = 1; b < PLIANT_BLOCK_COUNT; b++) {
+        const pliant_compression_result *r = &s->results[b];
+        if (r->dense == 0) continue;
+        printf("%s\"%s\": {\"kept\": %llu, \"dense\": %llu, \"factor\": %.6g, \"rms\": %.6g, \"max\": %.6g}",
+               first ? "" : ", ", pliant_block_text((pliant_block_name)b), (unsigned long long)r->kept,
+               (unsigned long long)r->dense, factor(r), r->rms, r->max);
+        first = 0;
+    }
+    const pliant_run_times *t = &s->times;
+    printf("}, \"seconds\": {\"read\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
+           "\"transform\": %.3f, \"compress\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n",
+           t->read, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+}
+
+// The command line as one would type it again, on one line.
+static char *join(int argc, char **argv)
+{
+    size_t size = 1;
+    for (int i = 0; i < argc; i++) size += 4 * strlen(argv[i]) + 3;
+    char *line = malloc(size), *end = line;
+    if (!line) return NULL;
+    for (int i = 0; i < argc; i++) {
+        const char *text = i == 0 ? program : argv[i];
+        const int plain = *text && !text[strcspn(text, " \t\n\"'\\$`<>|&;()*?[]#~!{}")];
+        if (i > 0) *end++ = ' ';
+        if (!plain) *end++ = '\'';
+        for (; *text; text++) {
+            if (*text == '\'') end += sprintf(end, "'\\''");
+            else *end++ = *text == '\n' ? ' ' : *text;
+        }
+        if (!plain) *end++ = '\'';
+    }
+    *end = 0;
+    return line;
+}
+
+static int run(int argc, char **argv, int rank)
+{
+    pliant_options options;
+    pliant_options_action action;
+    pliant_error err = {""};
+    const pliant_status status = pliant_options_parse(argc, argv, &options, &action, &err);
+    if (status < 0) {
+        if (rank == 0) fprintf(stderr, "%s: %s\n", program, err.text);
+        return EXIT_MISUSED;
+    }
+    if (action != PLIANT_OPTIONS_RUN) {
+        if (rank > 0) return EXIT_DONE;
+        if (action == PLIANT_OPTIONS_HELP) fputs(pliant_options_help(), stdout);
+        else printf("%s %s\n", program, PLIANT_VERSION_TEXT);
+        return fflush(stdout) == 0 ? EXIT_DONE : EXIT_FAILED;
+    }
+    char *command_line = join(argc, argv);
+    pliant_progress progress = pliant_progress_create(
+        rank == 0 && options.reporting != PLIANT_REPORT_QUIET ? program : NULL);
+    pliant_run_summary summary;
+    const PetscErrorCode code = pliant_run(PETSC_COMM_WORLD, &options, command_line ? command_line : program,
+                                           &progress, &summary, &err);
+    free(command_line);
+    if (code != 0 && code != PLIANT_REFUSED) MPI_Abort(PETSC_COMM_WORLD, EXIT_FAILED);
+    if (rank > 0) return code ? EXIT_FAILED : EXIT_DONE;
+    if (code) {
+        (void)pliant_progress_end(&progress);
+        fprintf(stderr, "%s: %s\n", program, err.text);
+        return EXIT_FAILED;
+    }
+    if (options.reporting == PLIANT_REPORT_JSON) print_json(&options, &summary);
+    else if (options.reporting == PLIANT_REPORT_TEXT) print_text(&options, &summary);
+    if (fflush(stdout) == 0 && !ferror(stdout)) return EXIT_DONE;
+    fprintf(stderr, "%s: cannot write the summary to standard output\n", program);
+    return EXIT_FAILED;
+}
+
+int main(int argc, char **argv)
+{
+    // Our options are ours: PETSc's come through PETSC_OPTIONS.
+    int none = 1;
+    char **first = argv;
+    if (PetscInitialize(&none, &first, NULL, NULL)) return EXIT_FAILED;
+    if (pliant_refusal_install()) return EXIT_FAILED;
+    int rank = 0;
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    const int status = run(argc, argv, rank);
+    PetscFinalize();
+    return status;
+}

@@ -1,0 +1,11 @@
+// model_output.h: write the model file of INTERFACE 5 from the ranks' compressed columns.
+#pragma once
+
+#include "greens.h"
+
+// Collective. The first rank writes; the columns come to it batch by batch. `provenance` (first rank
+// only) holds "key = value" lines. Nothing stands under `path` until the file is whole. *bytes is its
+// size, on the first rank.
+PetscErrorCode pliant_model_output_write(const char *path, pliant_greens *greens,
+                                         const pliant_options *options, const char *provenance,
+                                         double *bytes, pliant_error *err);

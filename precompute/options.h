@@ -1,0 +1,51 @@
+// options.h: what the command line of pliant-precompute asks for.
+#pragma once
+
+#include "bem/bem.h"
+#include "compression.h"
+#include "mesh/multires.h"
+
+typedef enum pliant_blocks {
+    PLIANT_BLOCKS_FREE,  // the free-free block only
+    PLIANT_BLOCKS_ALL,   // fixed rows and columns too
+} pliant_blocks;
+
+typedef enum pliant_reporting {
+    PLIANT_REPORT_TEXT,
+    PLIANT_REPORT_QUIET,  // nothing but errors
+    PLIANT_REPORT_JSON,   // one object on standard output
+} pliant_reporting;
+
+typedef enum pliant_existing {
+    PLIANT_KEEP_EXISTING,
+    PLIANT_REPLACE_EXISTING,  // --force
+} pliant_existing;
+
+typedef struct pliant_options {
+    const char *mesh, *output, *dense;  // dense NULL: none
+    int32_t subdivide;                  // -1: detect the levels of the mesh
+    pliant_subdivision_scheme scheme;
+    const char *fixed_expression, *fixed_list;  // either may be NULL
+    pliant_material material;
+    pliant_wavelet_def wavelet;
+    pliant_compression_def compression;
+    pliant_blocks blocks;
+    pliant_reporting reporting;
+    pliant_existing existing;
+} pliant_options;
+
+typedef enum pliant_options_action {
+    PLIANT_OPTIONS_RUN,
+    PLIANT_OPTIONS_HELP,
+    PLIANT_OPTIONS_VERSION,
+} pliant_options_action;
+
+// Parse; strings are borrowed from argv. PLIANT_ERR_ARGUMENT names the option, what it takes and
+// what it got.
+PLIANT_UNUSED_RESULT pliant_status pliant_options_parse(int argc, char **argv,
+                                                        pliant_options *options,
+                                                        pliant_options_action *action,
+                                                        pliant_error *err);
+
+// The text of --help; static.
+const char *pliant_options_help(void);

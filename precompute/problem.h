@@ -1,0 +1,30 @@
+// problem.h: the reference boundary value problem: surface, levels, support, domains (GF 3.2.1).
+#pragma once
+
+#include "options.h"
+#include "progress.h"
+
+#include <petscsys.h>
+
+typedef struct pliant_problem {
+    pliant_multires *multires;
+    pliant_hierarchy *hierarchy;
+    int32_t vertex_count;      // n
+    uint8_t *held;             // [n] 1 at fixed nodes
+    int32_t free_count, fixed_count;
+    int32_t *free_nodes, *fixed_nodes;  // ascending vertex numbers
+    double *areas;             // [n] a_i (GF-4)
+    // Transforms of the rows: displacements vanish where the solid is held, so their stencils may
+    // read zeros there; tractions of the held part do not vanish beyond it, so theirs drop nodes.
+    pliant_wavelet *free_wavelet, *fixed_wavelet;
+    double volume;
+    int32_t component_count;
+    uint64_t mesh_hash;        // FNV-1a over vertices and faces, of the finest level
+} pliant_problem;
+
+// Collective: the first rank reads and checks the inputs, all ranks get the problem. Notes on what
+// was mended go to `progress`.
+PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *options,
+                                     pliant_progress *progress, pliant_problem **problem,
+                                     pliant_error *err);
+PetscErrorCode pliant_problem_destroy(pliant_problem **problem);

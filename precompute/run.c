@@ -1,0 +1,289 @@
+// run.c: one precomputation from its options to its file.
+#include "run.h"
+
+#include "model_output.h"
+#include "node_memory.h"
+#include "refusal.h"
+
+#include "pliant/error.h"
+
+#include <errno.h>
+#include <hdf5.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#ifndef PLIANT_REVISION
+#define PLIANT_REVISION "unknown"
+#endif
+
+// The solutions of sampled rows may be this far off, relative to |A||x|, before it is an error: LU
+// with partial pivoting stays under 1e-12 for any system that a support makes well-posed.
+static const double residual_bound = 1e-8;
+
+// ---- Before the work: can it end well? ----
+
+// The folder of a path, in `folder`.
+static void folder_of(const char *path, char *folder, size_t size)
+{
+    const char *slash = strrchr(path, '/');
+    if (!slash) snprintf(folder, size, ".");
+    else snprintf(folder, size, "%.*s", (int)(slash == path ? 1 : slash - path), path);
+}
+
+static pliant_status check_output(const char *path, pliant_existing existing, pliant_error *err)
+{
+    struct stat found;
+    if (stat(path, &found) == 0) {
+        if (!S_ISREG(found.st_mode))
+            return pliant_error_set(err, PLIANT_ERR_IO, "%s: is not a regular file", path);
+        if (existing == PLIANT_KEEP_EXISTING)
+            return pliant_error_set(err, PLIANT_ERR_IO, "%s: exists already; --force replaces it", path);
+    }
+    char folder[4096];
+    folder_of(path, folder, sizeof folder);
+    if (access(folder, W_OK | X_OK) != 0)
+        return pliant_error_set(err, PLIANT_ERR_IO, "%s: cannot write to folder %s: %s", path, folder, strerror(errno));
+    return PLIANT_OK;
+}
+
+static void spool_folder(const char *output, char *folder, size_t size)
+{
+    const char *temporary = getenv("TMPDIR");
+    if (temporary && *temporary) snprintf(folder, size, "%s", temporary);
+    else folder_of(output, folder, size);
+}
+
+// Collective: state what the run will take, and refuse what cannot fit.
+static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const pliant_options *options,
+                                  const char *folder, pliant_progress *progress,
+                                  pliant_run_summary *summary, pliant_error *err)
+{
+    PetscFunctionBegin;
+    PetscMPIInt size, node_size;
+    MPI_Comm node;
+    PetscCallMPI(MPI_Comm_size(comm, &size));
+    PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
+    PetscCallMPI(MPI_Comm_size(node, &node_size));
+    PetscCallMPI(MPI_Comm_free(&node));
+
+    pliant_dense_plan plan;
+    PetscCall(pliant_dense_system_plan(comm, p->vertex_count, pliant_greens_batch(comm), &plan));
+    summary->solver = plan.kind;
+    const int all = options->blocks == PLIANT_BLOCKS_ALL;
+    const double rows = all ? p->vertex_count : p->free_count, columns = rows;
+    // Five groups of interleaved columns for each rank and block, in doubles.
+    const double work = 5.0 * rows * 9 * PLIANT_COLUMN_GROUP * sizeof(double) * (all ? 2 : 1) * size;
+    // What is kept, at the smallest compression seen in practice (GF 10.2: 8 at eps 0.01).
+    const double kept = rows * columns * 40 / 6;
+    const double needed = plan.matrix_bytes + plan.right_hand_bytes + plan.batch_bytes + work + kept;
+    summary->memory_bytes = needed;
+    const double here = needed * node_size / size, available = pliant_node_available();
+    const double spool = options->compression.eps > 0 ? 0 : rows * columns * 40 * node_size / size;
+
+    pliant_progress_note(progress,
+                         "%d vertices in %d levels, %d free and %d held; dense system of %d unknowns on "
+                         "%d ranks (%s)",
+                         p->vertex_count, p->multires->level_count, p->free_count, p->fixed_count,
+                         3 * p->vertex_count, size, plan.kind);
+    pliant_progress_note(progress, "memory %.2f GB (matrix %.2f, right-hand sides %.2f) of %.1f GB available; "
+                         "temporary columns up to %.2f GB in %s",
+                         needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9,
+                         available / 1e9, spool / 1e9, folder);
+    pliant_status status = PLIANT_OK;
+    struct statvfs disk;
+    if (available > 0 && here > available)
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                  "%s: needs %.2f GB of memory on this machine, %.2f GB are available: "
+                                  "use more machines or a coarser mesh",
+                                  options->mesh, here / 1e9, available / 1e9);
+    else if (statvfs(folder, &disk) == 0 && spool > (double)disk.f_bavail * (double)disk.f_frsize)
+        status = pliant_error_set(err, PLIANT_ERR_IO,
+                                  "%s: needs %.2f GB for temporary columns, %.2f GB are free: set TMPDIR",
+                                  folder, spool / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
+    PliantCall(comm, status, err);
+    PetscFunctionReturn(0);
+}
+
+// ---- The work ----
+
+// Rows are assembled a few vertices at a time, for the sake of progress.
+static const int32_t assembly_step = 16;
+
+static PetscErrorCode assemble(MPI_Comm comm, const pliant_problem *p, const pliant_options *options,
+                               pliant_dense_system *system, pliant_sample_row *sample,
+                               pliant_progress *progress, pliant_error *err)
+{
+    PetscFunctionBegin;
+    const pliant_dense_rows rows = pliant_dense_system_rows(system);
+    pliant_bem *bem = NULL;
+    pliant_status status = pliant_bem_create(p->multires->mesh, &options->material, &bem, err);
+    pliant_progress_begin(progress, "assemble", rows.row_end - rows.row_begin);
+    for (int32_t v = rows.row_begin; v < rows.row_end && status == PLIANT_OK; v += assembly_step) {
+        const int32_t end = rows.row_end - v < assembly_step ? rows.row_end : v + assembly_step;
+        const size_t at = 3 * (size_t)(v - rows.row_begin);
+        status = pliant_bem_assemble(bem, v, end, p->held, rows.A + at, rows.ld_a, rows.B + at, rows.ld_b,
+                                     rows.gravity + at, rows.ld_g, err);
+        pliant_progress_update(progress, end - rows.row_begin);
+    }
+    pliant_bem_destroy(bem);
+    PliantCall(comm, status, err);
+
+    // Keep one vertex's rows, against which the solutions will be tested.
+    sample->vertex = rows.row_begin < rows.row_end ? (rows.row_begin + rows.row_end) / 2 : -1;
+    const size_t unknowns = 3 * (size_t)p->vertex_count;
+    PetscCall(PetscMalloc1(3 * unknowns, &sample->A));
+    PetscCall(PetscMalloc1(3 * unknowns, &sample->B));
+    const size_t at = 3 * (size_t)(sample->vertex - rows.row_begin);
+    for (size_t u = 0; sample->vertex >= 0 && u < unknowns; u++) {
+        memcpy(sample->A + 3 * u, rows.A + u * rows.ld_a + at, 3 * sizeof(double));
+        memcpy(sample->B + 3 * u, rows.B + u * rows.ld_b + at, 3 * sizeof(double));
+    }
+    PetscFunctionReturn(0);
+}
+
+static void write_provenance(const pliant_run_summary *s, const pliant_problem *p,
+                             const pliant_options *options, const char *command_line, char *text,
+                             size_t size)
+{
+    unsigned major, minor, release;
+    char petsc[128] = "";
+    H5get_libversion(&major, &minor, &release);
+    (void)PetscGetVersion(petsc, sizeof petsc);
+    const char *comma = strchr(petsc, ',');
+    snprintf(text, size,
+             "program = pliant-precompute %s\n"
+             "revision = %s\n"
+             "command_line = %s\n"
+             "mesh = %s\n"
+             "mesh_hash = fnv1a64:%016llx\n"
+             "petsc = %.*s\n"
+             "hdf5 = %u.%u.%u\n"
+             "method = bem\n"
+             "ranks = %d\n"
+             "solver = %s\n"
+             "asked_eps = %.9g\n"
+             "asked_rms = %.9g\n"
+             "asked_max = %.9g\n"
+             "residual = %.3g\n"
+             "seconds_read = %.3f\n"
+             "seconds_assemble = %.3f\n"
+             "seconds_factor = %.3f\n"
+             "seconds_solve = %.3f\n"
+             "seconds_transform = %.3f\n"
+             "seconds_compress = %.3f\n",
+             PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh,
+             (unsigned long long)p->mesh_hash, comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc,
+             major, minor, release, s->ranks, s->solver, options->compression.eps,
+             options->compression.rms, options->compression.max, s->residual, s->times.read,
+             s->times.assemble, s->times.factor, s->times.solve, s->times.transform, s->times.compress);
+}
+
+// What a run holds; freed in reverse whatever happened.
+typedef struct held {
+    pliant_problem *problem;
+    pliant_dense_system *system;
+    pliant_sample_row sample;
+    pliant_greens *greens;
+    pliant_dense_output *dense;
+} held;
+
+static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const char *command_line,
+                           pliant_progress *progress, pliant_run_summary *s, held *h, pliant_error *err)
+{
+    PetscFunctionBegin;
+    PetscMPIInt rank;
+    PetscCallMPI(MPI_Comm_rank(comm, &rank));
+    PetscCallMPI(MPI_Comm_size(comm, &s->ranks));
+    const double begin = pliant_progress_clock();
+    pliant_status status = PLIANT_OK;
+    if (rank == 0) {
+        status = check_output(options->output, options->existing, err);
+        if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
+    }
+    PliantCall(comm, status, err);
+    pliant_progress_begin(progress, "read", 0);
+    PetscCall(pliant_problem_create(comm, options, progress, &h->problem, err));
+    s->times.read = pliant_progress_end(progress);
+    const pliant_problem *p = h->problem;
+    s->vertex_count = p->vertex_count;
+    s->face_count = p->multires->mesh->face_count;
+    s->level_count = p->multires->level_count;
+    s->free_count = p->free_count;
+    s->fixed_count = p->fixed_count;
+    s->component_count = p->component_count;
+    s->volume = p->volume;
+
+    char folder[4096];
+    spool_folder(options->output, folder, sizeof folder);
+    PetscCall(plan_memory(comm, p, options, folder, progress, s, err));
+    PetscCall(pliant_dense_system_create(comm, p->vertex_count, pliant_greens_batch(comm), &h->system));
+    PetscCall(assemble(comm, p, options, h->system, &h->sample, progress, err));
+    PetscCallMPI(MPI_Barrier(comm));
+    s->times.assemble = pliant_progress_end(progress);
+
+    pliant_progress_begin(progress, "factor", 0);
+    int singular;
+    PetscCall(pliant_dense_system_factor(h->system, &singular));
+    if (singular)
+        status = pliant_error_set(err, PLIANT_ERR_SINGULAR,
+                                  "%s: the boundary element system is singular: hold more of the surface", options->mesh);
+    PliantCall(comm, status, err);
+    s->times.factor = pliant_progress_end(progress);
+
+    PetscCall(pliant_greens_create(comm, p, options, folder, &h->greens, err));
+    if (options->dense)
+        PetscCall(pliant_dense_output_create(comm, options->dense, p, options->blocks, &h->dense, err));
+    PetscCall(pliant_greens_solve(h->greens, h->system, &h->sample, h->dense, progress, err));
+    (void)pliant_progress_end(progress);
+    s->times.solve = h->greens->solve_seconds;
+    s->times.transform = h->greens->transform_seconds;
+    s->residual = h->greens->residual;
+    if (!(s->residual <= residual_bound))
+        status = pliant_error_set(err, PLIANT_ERR_SINGULAR,
+                                  "%s: the solved columns miss the system by %.1e (expected under %.0e): "
+                                  "the support or the material makes it nearly singular",
+                                  options->mesh, s->residual, residual_bound);
+    PliantCall(comm, status, err);
+    PetscCall(pliant_dense_system_destroy(&h->system));
+
+    pliant_progress_begin(progress, "compress", 0);
+    PetscCall(pliant_greens_compress(h->greens, err));
+    s->times.compress = pliant_progress_end(progress);
+    memcpy(s->results, h->greens->results, sizeof s->results);
+
+    pliant_progress_begin(progress, "write", 0);
+    const size_t text_size = 4096 + strlen(command_line) + strlen(options->mesh);
+    char *text;
+    PetscCall(PetscMalloc1(text_size, &text));
+    write_provenance(s, p, options, command_line, text, text_size);
+    PetscErrorCode code = 0;
+    if (h->dense) code = pliant_dense_output_commit(h->dense, err);
+    if (code == 0)
+        code = pliant_model_output_write(options->output, h->greens, options, text, &s->file_bytes, err);
+    PetscCall(PetscFree(text));
+    PetscCall(code);
+    s->times.write = pliant_progress_end(progress);
+    s->times.total = pliant_progress_clock() - begin;
+    PetscFunctionReturn(0);
+}
+
+PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const char *command_line,
+                          pliant_progress *progress, pliant_run_summary *summary, pliant_error *err)
+{
+    PetscFunctionBegin;
+    held h = {0};
+    *summary = (pliant_run_summary){.solver = ""};
+    const PetscErrorCode code = work(comm, options, command_line, progress, summary, &h, err);
+    PetscCall(pliant_dense_output_destroy(&h.dense));
+    PetscCall(pliant_greens_destroy(&h.greens));
+    PetscCall(PetscFree(h.sample.B));
+    PetscCall(PetscFree(h.sample.A));
+    PetscCall(pliant_dense_system_destroy(&h.system));
+    PetscCall(pliant_problem_destroy(&h.problem));
+    PetscCall(code);
+    PetscFunctionReturn(0);
+}

@@ -1,0 +1,21 @@
+// run.h: one precomputation from its options to its file.
+#pragma once
+
+#include "greens.h"
+
+// Seconds of each phase; the order is the program's.
+typedef struct pliant_run_times {
+    double read, assemble, factor, solve, transform, compress, write, total;
+} pliant_run_times;
+
+typedef struct pliant_run_summary {
+    int32_t vertex_count, face_count, level_count, free_count, fixed_count, component_count, ranks;
+    const char *solver;            // "node" or "scalapack"
+    double volume, residual, memory_bytes, file_bytes;
+    pliant_compression_result results[PLIANT_BLOCK_COUNT];  // kept 0 where a block was not asked for
+    pliant_run_times times;
+} pliant_run_summary;
+
+// Collective. `command_line` goes into the file's provenance.
+PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const char *command_line,
+                          pliant_progress *progress, pliant_run_summary *summary, pliant_error *err);
