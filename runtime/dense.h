@@ -1,0 +1,34 @@
+// dense.h: the small dense matrices of contact: definiteness, inverse, product.
+//
+// LAPACK would do, but OpenBLAS (0.3.21, measured) allocates inside dgetri and dpotrf (2 to 290
+// malloc calls for 90 to 900 unknowns) and wakes threads from 200 unknowns on, neither of which a
+// frame may do. These kernels run on the caller's thread in memory the caller gives.
+//
+// Matrices are column-major with a leading dimension `stride`: element (i, j) at [i + j * stride].
+#pragma once
+
+#include "pliant/base.h"
+
+#include <stddef.h>
+
+// Strides are multiples of this many elements, and matrices 64-byte aligned.
+#define PLIANT_DENSE_LANES 16
+// Columns eliminated together.
+#define PLIANT_DENSE_PANEL 48
+
+// Least stride for n rows.
+size_t pliant_dense_stride(size_t n);
+// Elements of workspace that invert and definite need for n rows.
+size_t pliant_dense_work_count(size_t n);
+
+// Is the symmetric matrix whose lower triangle is in `matrix` positive definite? 1: yes, 0: no. By
+// Cholesky factorisation; destroys the lower triangle. `work` has shape [work_count].
+int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *work);
+
+// Invert in place, Gauss-Jordan with partial pivoting. Returns the smallest magnitude of a pivot
+// over the largest, 0 when a pivot vanished (the matrix is then garbage). Rows n .. stride-1 must be
+// zero and stay so. `pivots` has shape [n].
+double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *pivots, double *work);
+
+// y = A x; `y` has shape [stride], 64-byte aligned: rows n .. stride-1 of A must be zero.
+void pliant_dense_multiply(size_t n, size_t stride, const float *matrix, const float *x, float *y);

@@ -1,0 +1,220 @@
+// conditions.c: the boundary conditions that a script has set, and the solver that holds them.
+#include "conditions.h"
+
+#include "pliant/error.h"
+#include "pliant/hierarchy.h"
+
+#include <stdlib.h>
+
+enum { FIRST_CAPACITY = 64 };
+
+struct pliant_conditions {
+    const pliant_model *model;
+    pliant_solver_def solver_def;
+    pliant_solver *solver;
+    pliant_condition *list;
+    int32_t count, capacity;
+    pliant_vec3 gravity;
+    // 1 + the place in list of vertex v on level l, at node_offset[l] + v; 0 in the reference
+    // condition.
+    int32_t *slot;
+    size_t node_offset[PLIANT_LEVEL_LIMIT + 2];
+    int32_t node_count;  // over all levels, at most INT32_MAX
+};
+
+typedef enum growth {
+    GROW_CONSTRAINTS = 1,
+    GROW_LOADS = 2,
+    GROW_BOTH = 3,
+} growth;
+
+pliant_status pliant_conditions_create(const pliant_model *model, pliant_conditions **conditions,
+                                       pliant_error *err)
+{
+    pliant_conditions *c = calloc(1, sizeof *c);
+    if (!c) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a script's state");
+    const int32_t level_count = pliant_model_describe(model).level_count;
+    for (int32_t l = 0; l < level_count; l++)
+        c->node_offset[l + 1] =
+            c->node_offset[l] + (size_t)pliant_model_level_vertex_count(model, l);
+    const size_t node_count = c->node_offset[level_count];
+    c->model = model;
+    c->node_count = node_count < INT32_MAX ? (int32_t)node_count : INT32_MAX;
+    c->capacity = FIRST_CAPACITY;
+    c->slot = calloc(node_count, sizeof *c->slot);
+    c->list = calloc(FIRST_CAPACITY, sizeof *c->list);
+    c->solver_def = pliant_solver_default(model);
+    pliant_status status = PLIANT_OK;
+    if (!c->slot || !c->list)
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the state of %zu nodes",
+                                  node_count);
+    if (status == PLIANT_OK) status = pliant_solver_create(model, &c->solver_def, &c->solver, err);
+    if (status < 0) {
+        pliant_conditions_destroy(c);
+        return status;
+    }
+    *conditions = c;
+    return PLIANT_OK;
+}
+
+void pliant_conditions_destroy(pliant_conditions *conditions)
+{
+    if (!conditions) return;
+    pliant_solver_destroy(conditions->solver);
+    free(conditions->list);
+    free(conditions->slot);
+    free(conditions);
+}
+
+// ---- The solver's room ----
+
+static pliant_status apply(pliant_solver *solver, const pliant_condition *condition)
+{
+    switch (condition->kind) {
+    case PLIANT_CONDITION_DISPLACED:
+        return pliant_solver_displace(solver, condition->node, condition->value);
+    case PLIANT_CONDITION_PRESSED:
+        return pliant_solver_press(solver, condition->node, condition->value);
+    case PLIANT_CONDITION_SUPPORTED:
+        return pliant_solver_support(solver, condition->node, condition->value);
+    }
+    return PLIANT_ERR_ARGUMENT;
+}
+
+// Twice a capacity, at most one place per node. Returns 0 when it was that already.
+static int enlarge(int32_t *capacity, int32_t limit)
+{
+    if (*capacity >= limit) return 0;
+    *capacity = *capacity > limit / 2 ? limit : 2 * *capacity;
+    return 1;
+}
+
+// Replace the solver by one with more room and the same state; on failure the old one stays.
+static pliant_status grow(pliant_conditions *conditions, growth what)
+{
+    pliant_solver_def def = conditions->solver_def;
+    int grown = 0;
+    if (what & GROW_CONSTRAINTS) grown |= enlarge(&def.constraint_capacity, conditions->node_count);
+    if (what & GROW_LOADS) grown |= enlarge(&def.load_capacity, conditions->node_count);
+    if (!grown) return PLIANT_ERR_CAPACITY;
+
+    pliant_solver *solver = NULL;
+    pliant_status status = pliant_solver_create(conditions->model, &def, &solver, NULL);
+    const pliant_vec3 g = conditions->gravity;
+    if (status >= 0 && (g.x != 0 || g.y != 0 || g.z != 0))
+        status = pliant_solver_gravity(solver, g);
+    for (int32_t i = 0; status >= 0 && i < conditions->count; i++)
+        status = apply(solver, &conditions->list[i]);
+    if (status < 0) {
+        pliant_solver_destroy(solver);
+        return status;
+    }
+    pliant_solver_destroy(conditions->solver);
+    conditions->solver = solver;
+    conditions->solver_def = def;
+    return PLIANT_OK;
+}
+
+static growth growth_for(const pliant_conditions *conditions, const pliant_condition *condition)
+{
+    if (condition->kind == PLIANT_CONDITION_DISPLACED) return GROW_CONSTRAINTS;
+    // A pressed fixed vertex is both: its type changes, and it carries a load.
+    const int is_free = pliant_model_is_free(conditions->model, condition->node.vertex) == 1;
+    return condition->kind == PLIANT_CONDITION_PRESSED && !is_free ? GROW_BOTH : GROW_LOADS;
+}
+
+pliant_status pliant_conditions_solve(pliant_conditions *conditions)
+{
+    pliant_status status = pliant_solver_solve(conditions->solver);
+    while (status == PLIANT_ERR_CAPACITY) {
+        status = grow(conditions, GROW_BOTH);
+        if (status < 0) return status;
+        status = pliant_solver_solve(conditions->solver);
+    }
+    return status;
+}
+
+// ---- Changes ----
+
+static int32_t *slot_of(const pliant_conditions *conditions, pliant_node node)
+{
+    return &conditions->slot[conditions->node_offset[node.level] + (size_t)node.vertex];
+}
+
+static pliant_status reserve_one(pliant_conditions *conditions)
+{
+    if (conditions->count < conditions->capacity) return PLIANT_OK;
+    const size_t capacity = 2 * (size_t)conditions->capacity;
+    pliant_condition *list = realloc(conditions->list, capacity * sizeof *list);
+    if (!list) return PLIANT_ERR_MEMORY;
+    conditions->list = list;
+    conditions->capacity = (int32_t)capacity;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_conditions_set(pliant_conditions *conditions,
+                                    const pliant_condition *condition)
+{
+    int32_t *slot = slot_of(conditions, condition->node);
+    pliant_status status = *slot == 0 ? reserve_one(conditions) : PLIANT_OK;
+    if (status < 0) return status;
+    status = apply(conditions->solver, condition);
+    while (status == PLIANT_ERR_CAPACITY) {
+        status = grow(conditions, growth_for(conditions, condition));
+        if (status < 0) return status;
+        status = apply(conditions->solver, condition);
+    }
+    if (status < 0) return status;
+    if (*slot == 0) *slot = ++conditions->count;
+    conditions->list[*slot - 1] = *condition;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_conditions_set_gravity(pliant_conditions *conditions, pliant_vec3 acceleration)
+{
+    const pliant_status status = pliant_solver_gravity(conditions->solver, acceleration);
+    if (status >= 0) conditions->gravity = acceleration;
+    return status;
+}
+
+pliant_status pliant_conditions_drop(pliant_conditions *conditions, pliant_node node)
+{
+    // Releasing what is in its reference condition changes nothing, whatever the file holds.
+    int32_t *slot = slot_of(conditions, node);
+    if (*slot == 0) return PLIANT_OK;
+    const pliant_status status = pliant_solver_release(conditions->solver, node);
+    if (status < 0) return status;
+    // The last condition takes the place of the dropped one.
+    const pliant_condition moved = conditions->list[--conditions->count];
+    conditions->list[*slot - 1] = moved;
+    *slot_of(conditions, moved.node) = *slot;
+    *slot = 0;
+    return PLIANT_OK;
+}
+
+void pliant_conditions_drop_all(pliant_conditions *conditions)
+{
+    pliant_solver_release_all(conditions->solver);
+    for (int32_t i = 0; i < conditions->count; i++)
+        *slot_of(conditions, conditions->list[i].node) = 0;
+    conditions->count = 0;
+    conditions->gravity = (pliant_vec3){0, 0, 0};
+}
+
+// ---- What can be read ----
+
+const pliant_condition *pliant_conditions_list(const pliant_conditions *conditions, int32_t *count)
+{
+    *count = conditions->count;
+    return conditions->list;
+}
+
+pliant_vec3 pliant_conditions_gravity(const pliant_conditions *conditions)
+{
+    return conditions->gravity;
+}
+
+pliant_solver *pliant_conditions_solver(const pliant_conditions *conditions)
+{
+    return conditions->solver;
+}

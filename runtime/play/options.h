@@ -1,0 +1,26 @@
+// options.h: the command line of pliant-play.
+#pragma once
+
+#include "pliant/base.h"
+
+typedef struct pliant_play_options {
+    const char *model;
+    const char *script;   // "-": standard input
+    const char *csv, *frames, *vtk, *compare;  // NULL: not asked for
+    int32_t level;        // of --lod, -1: all
+    int32_t repeat, threads;
+    int force, quiet, json, verify;
+} pliant_play_options;  // strings are argv's
+
+typedef enum pliant_play_request {
+    PLIANT_PLAY_RUN,      // play
+    PLIANT_PLAY_HELP,     // print the help and leave
+    PLIANT_PLAY_VERSION,  // print the version and leave
+} pliant_play_request;
+
+// PLIANT_ERR_ARGUMENT: misuse; the message names the option, what was expected and what was found.
+PLIANT_UNUSED_RESULT pliant_status pliant_play_options_parse(int argc, char **argv,
+                                                             pliant_play_options *options,
+                                                             pliant_play_request *request,
+                                                             pliant_error *err);
+extern const char pliant_play_help[];  // the text of --help

@@ -1,0 +1,567 @@
+// player.c: executes the statements of a contact script against one solver.
+#include "player.h"
+
+#include "pliant/error.h"
+#include "pliant/hierarchy.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+struct pliant_player {
+    const pliant_model *model;
+    pliant_model_info info;
+    pliant_player_def def;
+    int32_t finest;  // L
+
+    pliant_conditions *conditions;
+
+    pliant_vec3 *surface;  // [surface_count]
+    int32_t surface_count;
+
+    // Integral of the basis function of vertex v on level l over its domain, at node_offset[l] + v, m^2.
+    double *hat_area;
+    size_t node_offset[PLIANT_LEVEL_LIMIT + 2];
+
+    pliant_probe *probes;
+    int32_t probe_count;
+    int32_t *probe_vertex;  // [probe_count]
+    pliant_vec3 *probe_u;   // [probe_count]
+
+    double dt;           // s
+    double time_start;   // time when dt last changed, s
+    int64_t dt_steps;    // steps since
+    pliant_step last;
+};
+
+static const double default_dt = 0.001;  // s: haptic rate
+
+// ---- Messages ----
+
+__attribute__((format(printf, 5, 6))) static pliant_status
+refuse(const pliant_player *player, const pliant_statement *statement, pliant_error *err,
+       pliant_status status, const char *format, ...)
+{
+    char reason[320];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(reason, sizeof reason, format, arguments);
+    va_end(arguments);
+    return pliant_error_set(err, status, "%.300s:%lld:%d: %s", player->def.script_name,
+                            (long long)statement->line, (int)statement->column, reason);
+}
+
+static const char *verb_of(pliant_statement_kind kind)
+{
+    switch (kind) {
+    case PLIANT_STATEMENT_DISPLACE: return "displace";
+    case PLIANT_STATEMENT_TRACTION: return "traction";
+    case PLIANT_STATEMENT_FORCE: return "force";
+    case PLIANT_STATEMENT_SUPPORT: return "support";
+    case PLIANT_STATEMENT_GRAVITY: return "gravity";
+    case PLIANT_STATEMENT_RELEASE: return "release";
+    default: return "statement";
+    }
+}
+
+// Put a status that the solver gave into words.
+static pliant_status explain(const pliant_player *player, const pliant_statement *statement,
+                             pliant_node node, pliant_status status, pliant_error *err)
+{
+    const char *verb = verb_of(statement->kind);
+    switch (status) {
+    case PLIANT_ERR_MISSING:
+        if (statement->kind == PLIANT_STATEMENT_GRAVITY)
+            return refuse(player, statement, err, status,
+                          "gravity needs /body/gravity, which the model does not have");
+        if (node.level < player->finest)
+            return refuse(player, statement, err, status,
+                          "level %d is not in the file: expected constraints on level %d",
+                          (int)node.level, (int)player->finest);
+        return refuse(player, statement, err, status,
+                      "%s at the fixed vertex %d needs a model precomputed with --blocks all", verb,
+                      (int)node.vertex);
+    case PLIANT_ERR_CAPACITY:
+        return refuse(player, statement, err, status,
+                      "%s: no more nodes can be changed than the model's %d", verb,
+                      (int)player->info.vertex_count);
+    case PLIANT_ERR_MEMORY:
+        return refuse(player, statement, err, status, "%s: no memory for one more changed node", verb);
+    default:
+        return refuse(player, statement, err, status, "%s refused for vertex %d: %s", verb,
+                      (int)node.vertex, pliant_status_name(status));
+    }
+}
+
+// ---- Life ----
+
+// Hat areas of every level, fine to coarse (GF-53): the hat of k on level l holds its finer hat and
+// half the hats of the odd vertices next to it,
+//   I_k(l) = I_k(l+1) + 1/2 sum of I_m(l+1), m odd beside k and in k's domain.
+// The odd vertices on an edge are seen once from each of its two faces, hence the quarter.
+static void measure_hats(pliant_player *player)
+{
+    const pliant_model *model = player->model;
+    for (int32_t v = 0; v < player->info.vertex_count; v++)
+        player->hat_area[player->node_offset[player->finest] + (size_t)v] =
+            pliant_model_area(model, v);
+    for (int32_t l = player->finest - 1; l >= 0; l--) {
+        const int32_t *coarse = pliant_model_faces(model, l);
+        const int32_t *fine = pliant_model_faces(model, l + 1);
+        double *area = player->hat_area + player->node_offset[l];
+        const double *fine_area = player->hat_area + player->node_offset[l + 1];
+        memcpy(area, fine_area,
+               (size_t)pliant_model_level_vertex_count(model, l) * sizeof *area);
+        const int32_t face_count = pliant_model_level_face_count(model, l);
+        for (int32_t f = 0; f < face_count; f++) {
+            const int32_t *corner = coarse + 3 * (size_t)f;
+            const int32_t *odd = fine + 3 * (4 * (size_t)f + 3);  // (ab, bc, ca)
+            for (int e = 0; e < 3; e++)
+                for (int end = 0; end < 2; end++) {
+                    const int32_t k = corner[(e + end) % 3];
+                    if (pliant_model_is_free(model, k) == pliant_model_is_free(model, odd[e]))
+                        area[k] += fine_area[odd[e]] / 4;
+                }
+        }
+    }
+}
+
+pliant_player_def pliant_player_default(const pliant_model *model)
+{
+    return (pliant_player_def){
+        .script_name = "script",
+        .level = pliant_model_describe(model).level_count - 1,
+        .probe_rule = PLIANT_PROBES_ANYTIME,
+    };
+}
+
+pliant_status pliant_player_create(const pliant_model *model, const pliant_player_def *def,
+                                   pliant_player **player, pliant_error *err)
+{
+    const pliant_model_info info = pliant_model_describe(model);
+    if (def->level < 0 || def->level >= info.level_count)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "level: expected 0 to %d, found %d",
+                                (int)info.level_count - 1, (int)def->level);
+    pliant_player *p = calloc(1, sizeof *p);
+    if (!p) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player");
+    p->model = model;
+    p->info = info;
+    p->def = *def;
+    p->finest = info.level_count - 1;
+    p->dt = default_dt;
+    p->surface_count = pliant_model_level_vertex_count(model, def->level);
+    for (int32_t l = 0; l < info.level_count; l++)
+        p->node_offset[l + 1] =
+            p->node_offset[l] + (size_t)pliant_model_level_vertex_count(model, l);
+    const size_t node_count = p->node_offset[info.level_count];
+
+    pliant_status status = PLIANT_OK;
+    p->surface = calloc((size_t)p->surface_count + 1, sizeof *p->surface);
+    p->hat_area = calloc(node_count, sizeof *p->hat_area);
+    if (!p->surface || !p->hat_area)
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player of %d vertices",
+                                  (int)info.vertex_count);
+    if (status == PLIANT_OK) status = pliant_conditions_create(model, &p->conditions, err);
+    if (status < 0) {
+        pliant_player_destroy(p);
+        return status;
+    }
+    measure_hats(p);
+    *player = p;
+    return PLIANT_OK;
+}
+
+void pliant_player_destroy(pliant_player *player)
+{
+    if (!player) return;
+    pliant_conditions_destroy(player->conditions);
+    free(player->probe_u);
+    free(player->probe_vertex);
+    free(player->probes);
+    free(player->hat_area);
+    free(player->surface);
+    free(player);
+}
+
+// ---- Nodes and values ----
+
+// The model's vertex or basis function that a statement names.
+static pliant_status resolve(const pliant_player *player, const pliant_statement *statement,
+                             pliant_node *node, pliant_error *err)
+{
+    const pliant_vertex_name *name = &statement->vertex;
+    *node = (pliant_node){player->finest, name->number};
+    switch (name->kind) {
+    case PLIANT_VERTEX_MODEL:
+        if (name->number < 0 || name->number >= player->info.vertex_count)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "vertex %d of %d",
+                          (int)name->number, (int)player->info.vertex_count);
+        return PLIANT_OK;
+    case PLIANT_VERTEX_LEVEL:
+        if (name->level < 0 || name->level > player->finest)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "level %d: expected 0 to %d", (int)name->level, (int)player->finest);
+        node->level = name->level;
+        const int32_t count = pliant_model_level_vertex_count(player->model, name->level);
+        if (name->number < 0 || name->number >= count)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "vertex %d of %d on level %d",
+                          (int)name->number, (int)count, (int)name->level);
+        return PLIANT_OK;
+    case PLIANT_VERTEX_SOURCE:
+        node->vertex = pliant_model_from_source(player->model, name->number);
+        if (node->vertex < 0)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "source vertex %d is not in the model", (int)name->number);
+        return PLIANT_OK;
+    case PLIANT_VERTEX_NEAR:
+        node->vertex = pliant_model_nearest(player->model, name->position);
+        if (node->vertex < 0)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "the model has no free vertex");
+        return PLIANT_OK;
+    default:
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "expected a vertex");
+    }
+}
+
+// The statement's vector times `scale`, in single precision.
+static pliant_status value_of(const pliant_player *player, const pliant_statement *statement,
+                              double scale, pliant_vec3 *value, pliant_error *err)
+{
+    float v[3];
+    for (int c = 0; c < 3; c++) {
+        v[c] = (float)(statement->value[c] * scale);
+        if (!isfinite(v[c]))
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "%g is beyond single precision", statement->value[c] * scale);
+    }
+    *value = (pliant_vec3){v[0], v[1], v[2]};
+    return PLIANT_OK;
+}
+
+// ---- Statements ----
+
+static pliant_status execute_condition(pliant_player *player, const pliant_statement *statement,
+                                       pliant_error *err)
+{
+    pliant_condition condition = {.kind = PLIANT_CONDITION_PRESSED};
+    pliant_status status = resolve(player, statement, &condition.node, err);
+    if (status < 0) return status;
+    const int32_t vertex = condition.node.vertex;
+    const int is_free = pliant_model_is_free(player->model, vertex) == 1;
+    double scale = 1;
+    switch (statement->kind) {
+    case PLIANT_STATEMENT_DISPLACE:
+        if (!is_free)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "vertex %d is fixed: displace needs a free one (support moves it)",
+                          (int)vertex);
+        condition.kind = PLIANT_CONDITION_DISPLACED;
+        break;
+    case PLIANT_STATEMENT_SUPPORT:
+        if (is_free)
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "vertex %d is free: support needs a fixed one (displace moves it)",
+                          (int)vertex);
+        condition.kind = PLIANT_CONDITION_SUPPORTED;
+        break;
+    case PLIANT_STATEMENT_FORCE:
+        // f_i = a_i p_i (GF-4), with the area of the hat that carries it.
+        scale = 1 / player->hat_area[player->node_offset[condition.node.level] + (size_t)vertex];
+        break;
+    default: break;
+    }
+    status = value_of(player, statement, scale, &condition.value, err);
+    if (status < 0) return status;
+    status = pliant_conditions_set(player->conditions, &condition);
+    return status < 0 ? explain(player, statement, condition.node, status, err) : PLIANT_OK;
+}
+
+static pliant_status execute_gravity(pliant_player *player, const pliant_statement *statement,
+                                     pliant_error *err)
+{
+    pliant_vec3 g;
+    pliant_status status = value_of(player, statement, 1, &g, err);
+    if (status < 0) return status;
+    status = pliant_conditions_set_gravity(player->conditions, g);
+    if (status < 0)
+        return explain(player, statement, (pliant_node){player->finest, 0}, status, err);
+    return PLIANT_OK;
+}
+
+static pliant_status execute_release(pliant_player *player, const pliant_statement *statement,
+                                     pliant_error *err)
+{
+    if (statement->vertex.kind == PLIANT_VERTEX_ALL) {
+        pliant_conditions_drop_all(player->conditions);
+        return PLIANT_OK;
+    }
+    pliant_node node;
+    pliant_status status = resolve(player, statement, &node, err);
+    if (status < 0) return status;
+    status = pliant_conditions_drop(player->conditions, node);
+    return status < 0 ? explain(player, statement, node, status, err) : PLIANT_OK;
+}
+
+static const pliant_probe *find_probe(const pliant_player *player, const char *name)
+{
+    for (int32_t i = 0; i < player->probe_count; i++)
+        if (strcmp(player->probes[i].name, name) == 0) return &player->probes[i];
+    return NULL;
+}
+
+static pliant_status reserve_probe(pliant_player *player)
+{
+    const size_t count = (size_t)player->probe_count + 1;
+    pliant_probe *probes = realloc(player->probes, count * sizeof *probes);
+    if (!probes) return PLIANT_ERR_MEMORY;
+    player->probes = probes;
+    int32_t *vertex = realloc(player->probe_vertex, count * sizeof *vertex);
+    if (!vertex) return PLIANT_ERR_MEMORY;
+    player->probe_vertex = vertex;
+    pliant_vec3 *u = realloc(player->probe_u, count * sizeof *u);
+    if (!u) return PLIANT_ERR_MEMORY;
+    player->probe_u = u;
+    return PLIANT_OK;
+}
+
+static pliant_status execute_probe(pliant_player *player, const pliant_statement *statement,
+                                   pliant_error *err)
+{
+    if (player->def.probe_rule == PLIANT_PROBES_FIRST && player->last.number > 0)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "probe %s after a step: with rows written per step (-o, --json), probes must "
+                      "come before the first",
+                      statement->name);
+    if (find_probe(player, statement->name))
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "probe %s is already there: expected another name", statement->name);
+    if (player->probe_count == PLIANT_PROBE_LIMIT)
+        return refuse(player, statement, err, PLIANT_ERR_CAPACITY, "more than %d probes",
+                      PLIANT_PROBE_LIMIT);
+    pliant_node node;
+    pliant_status status = resolve(player, statement, &node, err);
+    if (status < 0) return status;
+    status = reserve_probe(player);
+    if (status < 0) return refuse(player, statement, err, status, "no memory for another probe");
+    pliant_probe *probe = &player->probes[player->probe_count];
+    *probe = (pliant_probe){.vertex = node.vertex};
+    snprintf(probe->name, sizeof probe->name, "%s", statement->name);
+    if (player->def.level == player->finest) {
+        // The last step's surface holds the new probe too.
+        probe->step = player->last.number;
+        probe->u = player->surface[node.vertex];
+    }
+    player->probe_vertex[player->probe_count] = node.vertex;
+    player->probe_count++;
+    return PLIANT_OK;
+}
+
+static pliant_status execute_expect(pliant_player *player, const pliant_statement *statement,
+                                    const pliant_observer *observer, pliant_error *err)
+{
+    const pliant_probe *probe = find_probe(player, statement->name);
+    if (!probe)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "no probe %s: expected one declared before", statement->name);
+    if (probe->step == 0 || probe->step != player->last.number)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "probe %s has no displacement yet: expected a step before", statement->name);
+    const double found[3] = {probe->u.x, probe->u.y, probe->u.z};
+    pliant_expectation expectation = {
+        .probe = probe, .line = statement->line, .tolerance = statement->scalar};
+    double square = 0;
+    for (int c = 0; c < 3; c++) {
+        expectation.expected[c] = statement->value[c];
+        square += (found[c] - statement->value[c]) * (found[c] - statement->value[c]);
+    }
+    expectation.distance = sqrt(square);
+    expectation.met = expectation.distance <= expectation.tolerance;  // NaN is not
+    if (observer && observer->expected) {
+        const pliant_status status = observer->expected(observer->context, &expectation, err);
+        if (status < 0) return status;
+    }
+    if (expectation.met) return PLIANT_OK;
+    return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                  "expect %s: found %.6g %.6g %.6g, expected %.6g %.6g %.6g: distance %.6g, "
+                  "tolerance %.6g",
+                  probe->name, found[0], found[1], found[2], statement->value[0],
+                  statement->value[1], statement->value[2], expectation.distance,
+                  expectation.tolerance);
+}
+
+static pliant_status execute_dt(pliant_player *player, const pliant_statement *statement,
+                                pliant_error *err)
+{
+    if (!(statement->scalar > 0))
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "dt: expected more than 0 seconds, found %g", statement->scalar);
+    player->time_start += (double)player->dt_steps * player->dt;
+    player->dt_steps = 0;
+    player->dt = statement->scalar;
+    return PLIANT_OK;
+}
+
+// ---- Steps ----
+
+static int64_t now_ns(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
+}
+
+// A surface reconstructed to a coarser level holds that level's smoothed values (lifting moves
+// them), so probes are then evaluated selectively: what they say does not depend on the level.
+static pliant_status read_probes(pliant_player *player)
+{
+    const int whole = player->def.level == player->finest;
+    if (!whole && player->probe_count > 0) {
+        const pliant_status status =
+            pliant_solver_displacements(pliant_conditions_solver(player->conditions),
+                                        player->probe_vertex, player->probe_count, player->probe_u);
+        if (status < 0) return status;
+    }
+    for (int32_t i = 0; i < player->probe_count; i++) {
+        pliant_probe *probe = &player->probes[i];
+        probe->step = player->last.number;
+        probe->u = whole ? player->surface[probe->vertex] : player->probe_u[i];
+    }
+    return PLIANT_OK;
+}
+
+static pliant_status step_once(pliant_player *player, const pliant_statement *statement,
+                               pliant_error *err)
+{
+    const int64_t start = now_ns();
+    const pliant_status solved = pliant_conditions_solve(player->conditions);
+    pliant_solver *solver = pliant_conditions_solver(player->conditions);
+    pliant_status status = solved;
+    if (solved >= 0)
+        status = pliant_solver_surface(solver, player->def.level, player->surface);
+    const int64_t end = now_ns();
+    if (status < 0)
+        return refuse(player, statement, err, status, "step %lld with %d constraints: %s",
+                      (long long)player->last.number + 1,
+                      (int)pliant_solver_constraint_count(solver),
+                      status == PLIANT_ERR_SINGULAR ? "they contradict each other (singular)"
+                                                    : pliant_status_name(status));
+    player->dt_steps++;
+    player->last = (pliant_step){
+        .number = player->last.number + 1,
+        .time = player->time_start + (double)player->dt_steps * player->dt,
+        .status = solved,
+        .total_ns = end - start,
+        .report = pliant_solver_last(solver),
+        .force = pliant_solver_contact_force(solver),
+    };
+    status = read_probes(player);
+    if (status < 0)
+        return refuse(player, statement, err, status, "probes of step %lld: %s",
+                      (long long)player->last.number, pliant_status_name(status));
+    return PLIANT_OK;
+}
+
+static pliant_status execute_step(pliant_player *player, const pliant_statement *statement,
+                                  const pliant_observer *observer, pliant_error *err)
+{
+    for (int64_t i = 0; i < statement->count; i++) {
+        pliant_status status = step_once(player, statement, err);
+        if (status < 0) return status;
+        if (!observer || !observer->stepped) continue;
+        status = observer->stepped(observer->context, player, &player->last, err);
+        if (status < 0) return status;
+    }
+    return PLIANT_OK;
+}
+
+pliant_status pliant_player_execute(pliant_player *player, const pliant_statement *statement,
+                                    const pliant_observer *observer, pliant_error *err)
+{
+    switch (statement->kind) {
+    case PLIANT_STATEMENT_NONE: return PLIANT_OK;
+    case PLIANT_STATEMENT_VERSION: return PLIANT_OK;  // the parser accepts what it knows
+    case PLIANT_STATEMENT_PROBE: return execute_probe(player, statement, err);
+    case PLIANT_STATEMENT_DISPLACE:
+    case PLIANT_STATEMENT_TRACTION:
+    case PLIANT_STATEMENT_FORCE:
+    case PLIANT_STATEMENT_SUPPORT: return execute_condition(player, statement, err);
+    case PLIANT_STATEMENT_GRAVITY: return execute_gravity(player, statement, err);
+    case PLIANT_STATEMENT_RELEASE: return execute_release(player, statement, err);
+    case PLIANT_STATEMENT_DT: return execute_dt(player, statement, err);
+    case PLIANT_STATEMENT_STEP: return execute_step(player, statement, observer, err);
+    case PLIANT_STATEMENT_EXPECT: return execute_expect(player, statement, observer, err);
+    }
+    return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "unknown statement");
+}
+
+// A refusal that the next line may survive: the script's or the model's, not the machine's.
+static int is_refusal(pliant_status status)
+{
+    return status < 0 && status != PLIANT_ERR_IO && status != PLIANT_ERR_MEMORY;
+}
+
+pliant_status pliant_player_play(pliant_player *player, pliant_script *script,
+                                 const pliant_observer *observer, pliant_error *err)
+{
+    for (;;) {
+        pliant_statement statement;
+        int more = 0;
+        pliant_error reason;
+        pliant_status status = pliant_script_next(script, &statement, &more, &reason);
+        if (status >= 0 && !more) return PLIANT_OK;
+        if (status >= 0) status = pliant_player_execute(player, &statement, observer, &reason);
+        if (status >= 0) continue;
+        if (is_refusal(status) && observer && observer->refused &&
+            observer->refused(observer->context, &reason))
+            continue;
+        if (err) *err = reason;
+        return status;
+    }
+}
+
+// ---- What can be read ----
+
+const pliant_step *pliant_player_last(const pliant_player *player)
+{
+    return &player->last;
+}
+
+const pliant_vec3 *pliant_player_surface(const pliant_player *player)
+{
+    return player->surface;
+}
+
+int32_t pliant_player_surface_count(const pliant_player *player)
+{
+    return player->surface_count;
+}
+
+int32_t pliant_player_level(const pliant_player *player)
+{
+    return player->def.level;
+}
+
+const pliant_probe *pliant_player_probes(const pliant_player *player, int32_t *count)
+{
+    *count = player->probe_count;
+    return player->probes;
+}
+
+const pliant_condition *pliant_player_conditions(const pliant_player *player, int32_t *count)
+{
+    return pliant_conditions_list(player->conditions, count);
+}
+
+pliant_vec3 pliant_player_gravity(const pliant_player *player)
+{
+    return pliant_conditions_gravity(player->conditions);
+}
+
+pliant_solver *pliant_player_solver(pliant_player *player)
+{
+    return pliant_conditions_solver(player->conditions);
+}

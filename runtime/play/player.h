@@ -1,0 +1,97 @@
+// player.h: executes the statements of a contact script against one solver.
+//
+// A player owns a solver on a borrowed model, keeps the state that the script has set (conditions,
+// gravity, probes, time), and at every step solves and reconstructs the surface. It prints and
+// writes nothing: an observer is told what happened. The solver's capacities follow the script: a
+// script that needs more makes the player create a larger solver and hand it the state. Otherwise
+// only create and the declaration of a probe allocate.
+#pragma once
+
+#include "conditions.h"
+
+#include "pliant/pliant.h"
+#include "pliant/script.h"
+
+#define PLIANT_PROBE_LIMIT 1024  // probes of one script
+
+typedef struct pliant_player pliant_player;
+
+typedef enum pliant_probe_rule {
+    PLIANT_PROBES_ANYTIME,  // a probe may be declared between steps
+    PLIANT_PROBES_FIRST,    // all before the first step: rows of a table have one width
+} pliant_probe_rule;
+
+typedef struct pliant_player_def {
+    const char *script_name;       // for messages; borrowed until destroy
+    int32_t level;                 // the surface is reconstructed up to this level; default all
+    pliant_probe_rule probe_rule;  // default anytime
+} pliant_player_def;
+
+typedef struct pliant_probe {
+    char name[PLIANT_SCRIPT_NAME_LIMIT];
+    int32_t vertex;
+    int64_t step;    // the step that `u` belongs to, 0 before any
+    pliant_vec3 u;   // displacement, m
+} pliant_probe;
+
+// What one step did.
+typedef struct pliant_step {
+    int64_t number;         // 1 is the first
+    double time;            // s, at the end of the step
+    pliant_status status;   // of the solve: PLIANT_OK or a reduced result
+    int64_t total_ns;       // solve and surface together
+    pliant_solver_report report;
+    pliant_vec3 force;      // total contact force, N
+} pliant_step;
+
+typedef struct pliant_expectation {
+    const pliant_probe *probe;
+    int64_t line;
+    double expected[3], tolerance, distance;  // m
+    int met;                                  // 1: distance <= tolerance
+} pliant_expectation;
+
+// Told what happens during pliant_player_play; every function may be NULL. A negative status from
+// stepped or expected ends the play with that status.
+typedef struct pliant_observer {
+    void *context;
+    pliant_status (*stepped)(void *context, pliant_player *player, const pliant_step *step,
+                             pliant_error *err);
+    // Also for those that fail, before play returns or `refused` is asked.
+    pliant_status (*expected)(void *context, const pliant_expectation *expectation,
+                              pliant_error *err);
+    // A statement was refused, with no effect. 1: go on with the next line, 0: end the play.
+    int (*refused)(void *context, const pliant_error *reason);
+} pliant_observer;
+
+pliant_player_def pliant_player_default(const pliant_model *model);
+PLIANT_UNUSED_RESULT pliant_status pliant_player_create(const pliant_model *model,
+                                                        const pliant_player_def *def,
+                                                        pliant_player **player, pliant_error *err);
+void pliant_player_destroy(pliant_player *player);  // NULL is fine
+
+// Execute one statement; `step` solves as often as it says. Refusals read
+// "script:line:column: reason" and have no effect on the state; an expectation that is not met is
+// one. `observer` may be NULL.
+PLIANT_UNUSED_RESULT pliant_status pliant_player_execute(pliant_player *player,
+                                                         const pliant_statement *statement,
+                                                         const pliant_observer *observer,
+                                                         pliant_error *err);
+// Execute a script to its end or to the first refusal. `observer` may be NULL.
+PLIANT_UNUSED_RESULT pliant_status pliant_player_play(pliant_player *player, pliant_script *script,
+                                                      const pliant_observer *observer,
+                                                      pliant_error *err);
+
+// The last step; number 0 before any. Borrowed until the next step.
+const pliant_step *pliant_player_last(const pliant_player *player);
+// Displacements after the last step, shape [surface_count], zero before any; borrowed until destroy.
+const pliant_vec3 *pliant_player_surface(const pliant_player *player);
+int32_t pliant_player_surface_count(const pliant_player *player);  // |K(level)|
+int32_t pliant_player_level(const pliant_player *player);
+// In the order of declaration; borrowed until the next statement.
+const pliant_probe *pliant_player_probes(const pliant_player *player, int32_t *count);
+// In no particular order; borrowed until the next statement.
+const pliant_condition *pliant_player_conditions(const pliant_player *player, int32_t *count);
+pliant_vec3 pliant_player_gravity(const pliant_player *player);
+// For what the player does not keep (tractions, say); borrowed until the next statement.
+pliant_solver *pliant_player_solver(pliant_player *player);

@@ -1,0 +1,116 @@
+// report.c: what a played script has to say, as text.
+#include "report.h"
+
+#include <string.h>
+
+static void write_timings(const pliant_timings *timings, FILE *stream)
+{
+    fprintf(stream, "%-14s %12s %12s %12s\n", "phase", "median us", "99% us", "worst us");
+    for (int p = 0; p < PLIANT_PHASE_COUNT; p++) {
+        const pliant_histogram *h = &timings->phases[p];
+        fprintf(stream, "%-14s %12.1f %12.1f %12.1f\n", pliant_phase_name((pliant_phase)p),
+                1e-3 * pliant_histogram_percentile(h, 0.5),
+                1e-3 * pliant_histogram_percentile(h, 0.99),
+                1e-3 * pliant_histogram_percentile(h, 1));
+    }
+}
+
+static void write_probes(const pliant_player *player, FILE *stream)
+{
+    int32_t count;
+    const pliant_probe *probes = pliant_player_probes(player, &count);
+    int width = (int)strlen("contact force");
+    for (int32_t i = 0; i < count; i++)
+        if ((int)strlen(probes[i].name) > width) width = (int)strlen(probes[i].name);
+    fprintf(stream, "%-*s %8s %13s %13s %13s\n", width, "last step", "vertex", "x", "y", "z");
+    for (int32_t i = 0; i < count; i++) {
+        fprintf(stream, "%-*s %8d ", width, probes[i].name, (int)probes[i].vertex);
+        // Declared after the last step, on a level that was not reconstructed.
+        if (probes[i].step == 0)
+            fprintf(stream, "%13s %13s %13s\n", "-", "-", "-");
+        else
+            fprintf(stream, "%13.6g %13.6g %13.6g\n", (double)probes[i].u.x, (double)probes[i].u.y,
+                    (double)probes[i].u.z);
+    }
+    const pliant_vec3 f = pliant_player_last(player)->force;
+    fprintf(stream, "%-*s %8s %13.6g %13.6g %13.6g\n", width, "contact force", "", (double)f.x,
+            (double)f.y, (double)f.z);
+}
+
+void pliant_report_write_compare(const pliant_compare_summary *compare, FILE *stream)
+{
+    fprintf(stream, "against the dense solution, %lld steps:\n", (long long)compare->step_count);
+    fprintf(stream, "RMS difference   %.3g over all steps, worst %.3g at step %lld\n", compare->rms,
+            compare->rms_worst, (long long)compare->rms_step);
+    fprintf(stream, "MAX difference   worst %.3g at step %lld\n", compare->max_worst,
+            (long long)compare->max_step);
+    fprintf(stream, "force difference worst %.3g at step %lld\n", compare->force_worst,
+            (long long)compare->force_step);
+}
+
+void pliant_report_write(const pliant_report *report, FILE *stream)
+{
+    const pliant_crew_result *result = report->result;
+    const pliant_player *player = result->player;
+    const int64_t steps = pliant_player_last(player)->number;
+    fprintf(stream, "%s on %s: %lld %s", report->script, report->model, (long long)steps,
+            steps == 1 ? "step" : "steps");
+    if (steps == 0) {
+        fprintf(stream, ": nothing was solved\n");
+        return;
+    }
+    const int most = result->timings->most_constraints;
+    fprintf(stream, ", up to %d %s, surface of %d of %d vertices (level %d of 0..%d)\n", most,
+            most == 1 ? "constraint" : "constraints", (int)pliant_player_surface_count(player),
+            (int)report->info->vertex_count, (int)pliant_player_level(player),
+            (int)report->info->level_count - 1);
+    if (report->threads > 1 || report->repeat > 1)
+        fprintf(stream, "%d %s x %d %s: %lld steps in %.3f s, %.0f steps/s\n", (int)report->threads,
+                report->threads == 1 ? "solver" : "solvers at once", (int)report->repeat,
+                report->repeat == 1 ? "pass" : "passes", (long long)result->step_count,
+                result->seconds, (double)result->step_count / result->seconds);
+    fprintf(stream, "\n");
+    write_timings(result->timings, stream);
+    if (report->repeat > 1) {
+        const pliant_histogram *h = &result->warm_up->phases[PLIANT_PHASE_TOTAL];
+        fprintf(stream, "%-14s %12.1f %12.1f %12.1f\n", "first passes",
+                1e-3 * pliant_histogram_percentile(h, 0.5),
+                1e-3 * pliant_histogram_percentile(h, 0.99),
+                1e-3 * pliant_histogram_percentile(h, 1));
+    }
+    fprintf(stream, "\n");
+    write_probes(player, stream);
+    if (report->compare) {
+        fprintf(stream, "\n");
+        pliant_report_write_compare(report->compare, stream);
+    }
+}
+
+void pliant_report_write_step(const pliant_player *player, const pliant_step *step, FILE *stream)
+{
+    fprintf(stream, "step %lld time %.9g us %.1f constraints %d level %d",
+            (long long)step->number, step->time, (double)step->total_ns * 1e-3,
+            (int)step->report.constraint_count, (int)step->report.level);
+    int32_t count;
+    const pliant_probe *probes = pliant_player_probes(player, &count);
+    for (int32_t i = 0; i < count; i++)
+        fprintf(stream, " %s %.6g %.6g %.6g", probes[i].name, (double)probes[i].u.x,
+                (double)probes[i].u.y, (double)probes[i].u.z);
+    fprintf(stream, " force %.6g %.6g %.6g\n", (double)step->force.x, (double)step->force.y,
+            (double)step->force.z);
+}
+
+void pliant_report_write_expectation(const pliant_expectation *expectation, FILE *stream)
+{
+    if (expectation->met) {
+        fprintf(stream, "ok\n");
+        return;
+    }
+    const pliant_vec3 u = expectation->probe->u;
+    const double *e = expectation->expected;
+    fprintf(stream,
+            "failed: %s: found %.6g %.6g %.6g, expected %.6g %.6g %.6g: distance %.6g, tolerance "
+            "%.6g\n",
+            expectation->probe->name, (double)u.x, (double)u.y, (double)u.z, e[0], e[1], e[2],
+            expectation->distance, expectation->tolerance);
+}

@@ -1,0 +1,24 @@
+// timings.h: how long the phases of played steps took, and what was odd about them.
+#pragma once
+
+#include "histogram.h"
+#include "player.h"
+
+typedef enum pliant_phase {
+    PLIANT_PHASE_CAPACITANCE,  // assembling and factoring C
+    PLIANT_PHASE_CONTACT,      // selective reconstruction and C^-1
+    PLIANT_PHASE_SUMMATION,    // sparse sums
+    PLIANT_PHASE_SURFACE,      // inverse transform of the surface
+    PLIANT_PHASE_TOTAL,        // from the state to the surface, by the player's clock
+    PLIANT_PHASE_COUNT,
+} pliant_phase;
+
+typedef struct pliant_timings {
+    pliant_histogram phases[PLIANT_PHASE_COUNT];
+    int64_t rough_count;            // steps that solved with PLIANT_ROUGH
+    int32_t most_constraints;       // the largest s
+} pliant_timings;  // zeroed is empty; about 300 kB
+
+const char *pliant_phase_name(pliant_phase phase);  // static
+void pliant_timings_add(pliant_timings *timings, const pliant_step *step);
+void pliant_timings_merge(pliant_timings *timings, const pliant_timings *other);

@@ -1,0 +1,82 @@
+// solver.h: one boundary value problem on a model: its statements, its last solution, its scratch.
+#pragma once
+
+#include "capacitance.h"
+#include "model.h"
+
+// A node of S: its specified value, and after a solve the one of reference type that realises it.
+typedef struct pliant_constraint {
+    int32_t vertex;
+    pliant_vec3 value;  // displacement of a displaced node, traction of a freed one
+} pliant_constraint;
+
+// A node outside S with a specified value: traction of a free node, displacement of a fixed one.
+typedef struct pliant_load {
+    int32_t vertex;
+    int32_t is_specified;  // 0: released, but still in the sum until the next solve
+    pliant_vec3 value;     // as stated
+    pliant_vec3 summed;    // as it is in base, which is as it was in the last solve
+    float weight[PLIANT_DOMAIN_COUNT];  // largest number of its column in a row domain; -1: not known
+} pliant_load;
+
+// What a domain's rows hold. Rows are [count + 1][4] floats, xyz0, the last one zero.
+typedef struct pliant_field {
+    float *base;        // g of step (3): everything specified outside S; kept from solve to solve
+    int32_t is_loaded;  // 0: base is zero
+    float *g;           // g of step (6), and then values up to level `reconstructed`
+    int32_t is_summed;  // 0: g is stale and to be summed when asked for
+    int32_t reconstructed;  // 0: coefficients (which the values of level 0 are)
+    double magnitude;   // sum over the specified values of |value| * weight: bounds |base|
+    double drift;       // bound of the rounding error in base, in the same unit
+    float gravity_weight;
+    // The last selective query's plan.
+    pliant_reconstruction plan;
+    int32_t query_count, query_is_planned;
+    int32_t *query_positions, *query_slots;  // shape [query_capacity]
+} pliant_field;
+
+struct pliant_solver {
+    const pliant_model *model;  // borrowed
+    pliant_arena arena;
+    pliant_columns_kernel *add_column;
+    int32_t domain_count;  // domains with rows: 2 with supports, else 1
+    int32_t constraint_capacity, load_capacity, cache_count;
+    int32_t query_capacity, query_at_once;  // see solver.c
+
+    // Statements.
+    int32_t constraint_count;
+    pliant_constraint *constraints;  // shape [capacity], vertices ascending
+    int32_t load_count;              // also those released since the last solve
+    int32_t specified_count;         // without them
+    pliant_load *loads;              // shape [2 load_capacity]
+    int32_t *load_of;                // shape [n]: load of a vertex, or -1
+    int32_t loads_changed;
+    pliant_vec3 gravity, summed_gravity;
+
+    // The last solve.
+    int32_t solved_count;
+    pliant_constraint *solved;  // shape [capacity]
+    pliant_vec3 *reference;     // shape [capacity]: g_S of step (5)
+    float *fixed_displacement;  // shape [k][4]: supports
+    pliant_field fields[PLIANT_DOMAIN_COUNT];
+    pliant_solver_report report;
+
+    // Types and scratch.
+    pliant_capacitance *types;  // shape [cache_count]
+    int64_t solve_count;
+    pliant_capacitance_scratch scratch;
+    int32_t *key;               // shape [capacity]
+    float *contact_values;      // shape [3 capacity]: q of step (4)
+    float *contact_solution;    // shape [stride]
+    int32_t *query_scratch;      // shape [query_capacity]
+    int32_t *all_rows;          // shape [max(m, k)]: 0, 1, 2, ...
+};
+
+// Index in `constraints` (shape [count], ascending) of a vertex, or where it would go as -1 - index.
+int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t count, int32_t vertex);
+
+// Step (6): bring a domain's g up to date as coefficients.
+void pliant_solver_sum(pliant_solver *solver, int32_t domain);
+
+// Monotonic nanoseconds.
+int64_t pliant_solver_clock(void);

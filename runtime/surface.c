@@ -1,0 +1,192 @@
+// surface.c: read a solution: the whole surface to a level, or chosen vertices (steps (7), (8)).
+#include "solver.h"
+
+#include <string.h>
+
+typedef float row4 __attribute__((vector_size(16)));
+
+static int32_t find_solved(const pliant_solver *solver, int32_t vertex)
+{
+    return pliant_constraint_find(solver->solved, solver->solved_count, vertex);
+}
+
+// (7) v = W^-1 g up to `level`, in place. What a coarser level needed has been overwritten, so another
+// level starts from a new sum.
+static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
+{
+    pliant_field *field = &solver->fields[d];
+    if (field->is_summed && field->reconstructed == level) return;
+    pliant_solver_sum(solver, d);
+    pliant_wavelet_inverse_online(solver->model->domains[d].wavelet, level, field->g);
+    field->reconstructed = level;
+}
+
+// Scatter rows of four to packed vertices, ascending. A store of four floats spills one into the
+// next vertex, which is written later: by this loop, or by the caller's pass over the fixed ones. Only
+// the last vertex has nobody behind it.
+static void pack_free(const float *g, const int32_t *nodes, int32_t count, int32_t vertex_count,
+                      pliant_vec3 *u)
+{
+    const row4 *row = (const row4 *)g;
+    float *to = (float *)u;
+    const int32_t last = count > 0 && nodes[count - 1] == vertex_count - 1 ? count - 1 : count;
+    for (int32_t p = 0; p < last; p++) memcpy(to + 3 * (size_t)nodes[p], &row[p], sizeof(row4));
+    if (last < count) memcpy(&u[vertex_count - 1], g + 4 * (size_t)last, sizeof *u);
+}
+
+static void pack_fixed(const float *displacement, const int32_t *nodes, int32_t count, pliant_vec3 *u)
+{
+    for (int32_t p = 0; p < count; p++) memcpy(&u[nodes[p]], displacement + 4 * (size_t)p, sizeof *u);
+}
+
+pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant_vec3 *u)
+{
+    const pliant_model *model = solver->model;
+    if (level < 0 || level > model->finest_level || !u) return PLIANT_ERR_ARGUMENT;
+    const int64_t begin = pliant_solver_clock();
+    reconstruct(solver, PLIANT_DOMAIN_FREE, level);
+
+    const int32_t vertex_count = model->hierarchy->vertex_count[level];
+    const pliant_model_domain *free_domain = &model->domains[PLIANT_DOMAIN_FREE];
+    const pliant_model_domain *fixed_domain = &model->domains[PLIANT_DOMAIN_FIXED];
+    pack_free(solver->fields[PLIANT_DOMAIN_FREE].g, free_domain->nodes,
+              free_domain->wavelet->level_offset[level + 1], vertex_count, u);
+    pack_fixed(solver->fixed_displacement, fixed_domain->nodes,
+               fixed_domain->wavelet->level_offset[level + 1], u);
+    // (8) at S the displacement is known: specified at free nodes, solved for at freed ones.
+    for (int32_t i = 0; i < solver->solved_count; i++) {
+        const int32_t vertex = solver->solved[i].vertex;
+        if (vertex >= vertex_count) continue;
+        u[vertex] = model->domain[vertex] == PLIANT_DOMAIN_FREE ? solver->solved[i].value
+                                                                : solver->reference[i];
+    }
+    solver->report.surface_ns = pliant_solver_clock() - begin;
+    return PLIANT_OK;
+}
+
+// ---- Chosen vertices ----
+
+// What is known of v without the rows of `d`: everything outside that domain, and S.
+static int32_t find_known(const pliant_solver *solver, int32_t d, int32_t vertex, pliant_vec3 *v)
+{
+    const int32_t in_domain = solver->model->domain[vertex] == d;
+    const int32_t i = find_solved(solver, vertex);
+    if (i >= 0) {
+        *v = in_domain ? solver->solved[i].value : solver->reference[i];
+        return 1;
+    }
+    if (in_domain) return 0;
+    const int32_t load = solver->load_of[vertex];
+    *v = load >= 0 ? solver->loads[load].summed : (pliant_vec3){0, 0, 0};
+    return 1;
+}
+
+static pliant_vec3 row_value(const float *row)
+{
+    return (pliant_vec3){row[0], row[1], row[2]};
+}
+
+// Have a plan for these positions, if that is quicker than the whole transform. A plan costs some
+// ten times its run, so a set that is new is planned at once only when it is small, else when it
+// comes a second time (probes do, every frame).
+static int32_t plan_query(pliant_solver *solver, int32_t d, const int32_t *positions, int32_t count)
+{
+    pliant_field *field = &solver->fields[d];
+    if (count > solver->query_capacity) return 0;
+    const int32_t is_known =
+        field->query_count == count &&
+        memcmp(field->query_positions, positions, (size_t)count * sizeof *positions) == 0;
+    if (is_known && field->query_is_planned) return 1;
+    if (!is_known) {
+        memcpy(field->query_positions, positions, (size_t)count * sizeof *positions);
+        field->query_count = count;
+        field->query_is_planned = 0;
+        if (count > solver->query_at_once) return 0;
+    }
+    pliant_reconstruction_build(&field->plan, &solver->scratch.domain[d], positions, count,
+                                field->query_slots);
+    field->query_is_planned = 1;
+    return 1;
+}
+
+// v at chosen vertices, of the quantity that lives on the rows of `d`.
+static void evaluate(pliant_solver *solver, int32_t d, const int32_t *vertices, int32_t count,
+                     pliant_vec3 *v)
+{
+    const pliant_model *model = solver->model;
+    pliant_field *field = &solver->fields[d];
+    int32_t *positions = solver->query_scratch;
+    int32_t asked = 0;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t vertex = vertices ? vertices[i] : i;
+        if (find_known(solver, d, vertex, &v[i])) continue;
+        if (asked < solver->query_capacity) positions[asked] = model->position[vertex];
+        asked++;
+    }
+    if (asked == 0) return;
+
+    const float *rows = field->g;
+    const int32_t is_whole = field->is_summed && field->reconstructed == model->finest_level;
+    const int32_t is_selective = !is_whole && plan_query(solver, d, positions, asked);
+    if (is_selective) {
+        pliant_solver_sum(solver, d);
+        pliant_reconstruction_run(&field->plan, field->g, solver->scratch.blocks);
+        rows = solver->scratch.blocks;
+    } else {
+        reconstruct(solver, d, model->finest_level);
+    }
+    for (int32_t i = 0, k = 0; i < count; i++) {
+        const int32_t vertex = vertices ? vertices[i] : i;
+        pliant_vec3 ignored;
+        if (find_known(solver, d, vertex, &ignored)) continue;
+        const int32_t row = is_selective ? field->query_slots[k++] : model->position[vertex];
+        v[i] = row_value(rows + 4 * (size_t)row);
+    }
+}
+
+static pliant_status check_vertices(const pliant_solver *solver, const int32_t *vertices,
+                                    int32_t count, const pliant_vec3 *values)
+{
+    const int32_t n = solver->model->vertex_count;
+    if (count < 0 || (count > 0 && !values) || (!vertices && count > n)) return PLIANT_ERR_ARGUMENT;
+    if (vertices)
+        for (int32_t i = 0; i < count; i++)
+            if (vertices[i] < 0 || vertices[i] >= n) return PLIANT_ERR_ARGUMENT;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_solver_displacements(pliant_solver *solver, const int32_t *vertices,
+                                          int32_t count, pliant_vec3 *u)
+{
+    const pliant_status status = check_vertices(solver, vertices, count, u);
+    if (status < 0) return status;
+    evaluate(solver, PLIANT_DOMAIN_FREE, vertices, count, u);
+    return PLIANT_OK;
+}
+
+pliant_status pliant_solver_tractions(pliant_solver *solver, const int32_t *vertices, int32_t count,
+                                      pliant_vec3 *p)
+{
+    const pliant_status status = check_vertices(solver, vertices, count, p);
+    if (status < 0) return status;
+    if (solver->domain_count < 2)
+        for (int32_t i = 0; i < count; i++)
+            if (solver->model->domain[vertices ? vertices[i] : i] == PLIANT_DOMAIN_FIXED)
+                return PLIANT_ERR_MISSING;
+    evaluate(solver, PLIANT_DOMAIN_FIXED, vertices, count, p);
+    return PLIANT_OK;
+}
+
+pliant_vec3 pliant_solver_contact_force(const pliant_solver *solver)
+{
+    double force[3] = {0};
+    for (int32_t i = 0; i < solver->solved_count; i++) {
+        const int32_t vertex = solver->solved[i].vertex;
+        if (solver->model->domain[vertex] != PLIANT_DOMAIN_FREE) continue;
+        const double area = solver->model->areas[vertex];
+        force[0] += area * (double)solver->reference[i].x;
+        force[1] += area * (double)solver->reference[i].y;
+        force[2] += area * (double)solver->reference[i].z;
+    }
+    return (pliant_vec3){(float)force[0], (float)force[1], (float)force[2]};
+}

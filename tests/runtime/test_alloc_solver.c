@@ -1,0 +1,152 @@
+// test_alloc_solver.c: frames allocate nothing, not even those that factor a new type.
+//
+// The program's own malloc family stands before the C library's and counts. The sanitizers have
+// theirs there, so under them this test is skipped.
+#include "check.h"
+
+#include "synthetic_model.h"
+
+#include "pliant/pliant.h"
+
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#define COUNTING 0
+#else
+#define COUNTING 1
+#endif
+
+static atomic_long calls;
+
+#if COUNTING
+#include <sys/mman.h>
+#include <sys/syscall.h>
+
+extern void *__libc_malloc(size_t size);
+extern void *__libc_calloc(size_t count, size_t size);
+extern void *__libc_realloc(void *memory, size_t size);
+extern void *__libc_memalign(size_t alignment, size_t size);
+extern void __libc_free(void *memory);
+
+void *malloc(size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_malloc(size);
+}
+void *calloc(size_t count, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_calloc(count, size);
+}
+void *realloc(void *memory, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_realloc(memory, size);
+}
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    return __libc_memalign(alignment, size);
+}
+int posix_memalign(void **memory, size_t alignment, size_t size)
+{
+    atomic_fetch_add(&calls, 1);
+    *memory = __libc_memalign(alignment, size);
+    return *memory ? 0 : 12;
+}
+void free(void *memory)
+{
+    if (memory) atomic_fetch_add(&calls, 1);
+    __libc_free(memory);
+}
+void *mmap(void *address, size_t length, int protection, int flags, int file, off_t offset)
+{
+    atomic_fetch_add(&calls, 1);
+    return (void *)syscall(SYS_mmap, address, length, protection, flags, file, offset);
+}
+#endif
+
+static void the_counter_counts(void **state)
+{
+    (void)state;
+    if (!COUNTING) skip();
+    const long before = atomic_load(&calls);
+    void *volatile memory = malloc(10);
+    free(memory);
+    assert_int_equal(atomic_load(&calls) - before, 2);
+}
+
+static void frames_of_all_kinds_allocate_nothing(void **state)
+{
+    (void)state;
+    if (!COUNTING) skip();
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/pliant_test_alloc_%d.h5", (int)getpid());
+    check_write_synthetic_model(path, NULL, 3, 0.05, pliant_wavelet_default(), CHECK_ALL_BLOCKS);
+    pliant_error err = {""};
+    pliant_model *model = NULL;
+    pliant_solver *solver = NULL;
+    check_ok(pliant_model_open(path, &model, &err), &err);
+    unlink(path);
+    const pliant_solver_def def = {.constraint_capacity = 100, .load_capacity = 50, .cache_count = 2};
+    check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
+
+    const int32_t n = pliant_model_describe(model).vertex_count;
+    static pliant_vec3 u[1000];
+    assert_in_range(n, 1, 1000);
+    check_random random = check_random_seed(1);
+    int32_t factored = 0, refused = 0, largest = 0;
+    const long before = atomic_load(&calls);
+    for (int frame = 0; frame < 300; frame++) {
+        const int32_t centre = check_random_index(&random, n);
+        const int32_t changes = frame % 50 == 0 ? 120 : 12;
+        for (int i = 0; i < changes; i++) {
+            const pliant_node node = {3, frame % 2 ? check_random_index(&random, n) : (centre + i) % n};
+            const pliant_vec3 value = {0, (float)check_random_next(&random), 0.1f};
+            const double kind = check_random_next(&random);
+            const int32_t is_free = pliant_model_is_free(model, node.vertex);
+            pliant_status status;
+            if (kind < 0.3) status = pliant_solver_release(solver, node);
+            else if (kind < 0.5) status = pliant_solver_press(solver, node, value);
+            else if (is_free) status = pliant_solver_displace(solver, node, value);
+            else status = pliant_solver_support(solver, node, value);
+            if (status < 0) {
+                assert_int_equal(status, PLIANT_ERR_CAPACITY);
+                refused++;
+            }
+        }
+        if (frame % 7 == 0)
+            assert_int_equal(pliant_solver_gravity(solver, (pliant_vec3){0, 0, (float)frame}), PLIANT_OK);
+        if (pliant_solver_constraint_count(solver) > largest)
+            largest = pliant_solver_constraint_count(solver);
+        assert_true(pliant_solver_solve(solver) >= 0);
+        factored += pliant_solver_last(solver).factored;
+        int32_t probes[20];
+        for (int i = 0; i < 20; i++) probes[i] = check_random_index(&random, n);
+        assert_int_equal(pliant_solver_displacements(solver, probes, 1 + frame % 20, u), PLIANT_OK);
+        assert_int_equal(pliant_solver_displacements(solver, (const int32_t[]){5, 9, 17, 600}, 4, u), PLIANT_OK);
+        assert_int_equal(pliant_solver_surface(solver, frame % 4, u), PLIANT_OK);
+        assert_int_equal(pliant_solver_tractions(solver, frame % 3 ? probes : NULL, 20, u), PLIANT_OK);
+        (void)pliant_solver_contact_force(solver);
+        if (frame % 60 == 59) pliant_solver_release_all(solver);
+    }
+    assert_int_equal(atomic_load(&calls) - before, 0);
+    // The frames were what they claim.
+    check_at_least(factored, 150);
+    check_at_least(largest, 90);
+    check_at_least(refused, 1);
+    pliant_solver_destroy(solver);
+    pliant_model_close(model);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_counter_counts),
+        cmocka_unit_test(frames_of_all_kinds_allocate_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,797 @@
+// test_play.c: the program pliant-play: what it prints, writes, refuses and leaves behind.
+//
+// PLIANT_BUILD names the folder of the program; default build.
+#include "check.h"
+
+#include "pliant/reader.h"
+#include "synthetic_model.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { TEXT_SIZE = 1 << 16 };
+
+static char program[1024], folder[64];
+static char out[TEXT_SIZE], err[TEXT_SIZE];  // of the last run
+
+// ---- Files ----
+
+static const char *in_folder(const char *name)
+{
+    static char paths[4][256];
+    static int turn;
+    char *path = paths[turn++ % 4];
+    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+    return path;
+}
+
+static void write_text(const char *name, const char *text)
+{
+    FILE *file = fopen(in_folder(name), "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void read_text(const char *name, char text[TEXT_SIZE])
+{
+    FILE *file = fopen(in_folder(name), "r");
+    if (!file) fail_msg("%s: %s", name, strerror(errno));
+    text[fread(text, 1, TEXT_SIZE - 1, file)] = 0;
+    fclose(file);
+}
+
+static int exists(const char *name)
+{
+    return access(in_folder(name), F_OK) == 0;
+}
+
+// Run a shell line in the folder, $P being the program; its exit status, with `out` and `err` filled.
+__attribute__((format(printf, 1, 2))) static int run(const char *format, ...)
+{
+    char line[4096];
+    va_list arguments;
+    int used = snprintf(line, sizeof line, "cd '%s' && P='%s' && { ", folder, program);
+    va_start(arguments, format);
+    used += vsnprintf(line + used, sizeof line - (size_t)used, format, arguments);
+    va_end(arguments);
+    snprintf(line + used, sizeof line - (size_t)used, " ; } 2>err.txt");
+    FILE *pipe = popen(line, "r");
+    assert_non_null(pipe);
+    out[fread(out, 1, sizeof out - 1, pipe)] = 0;
+    const int status = pclose(pipe);
+    read_text("err.txt", err);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+static void check_status(int found, int expected, const char *file, int line)
+{
+    if (found == expected) return;
+    print_error("exit status %d, expected %d\nstandard output: %s\nstandard error: %s\n", found,
+                expected, out, err);
+    _fail(file, line);
+}
+
+#define check_run(expected, ...) check_status(run(__VA_ARGS__), (expected), __FILE__, __LINE__)
+
+static void check_contains(const char *text, const char *part)
+{
+    if (!strstr(text, part)) fail_msg("expected \"%s\" in:\n%s", part, text);
+}
+
+static int count_lines(const char *text)
+{
+    int count = 0;
+    for (; *text; text++) count += *text == '\n';
+    return count;
+}
+
+// A script whose steps do something: 7 steps, two probes.
+static const char poke[] = "pliant-script 1\n"
+                           "probe nose near 0 0 1\n"
+                           "probe side near 1 0 0\n"
+                           "displace near 0 0 1 0 0 -0.02\n"
+                           "step\n"
+                           "traction near 1 0 0 0.5 0 0\n"
+                           "step 3\n"
+                           "gravity 0 0 -0.25\n"
+                           "dt 0.01\n"
+                           "step 2\n"
+                           "force near 0 1 0 0.1 0 0\n"
+                           "step\n"
+                           "expect nose 0 0 -0.02 1e-8\n";
+
+static int set_up(void **state)
+{
+    (void)state;
+    const char *build = getenv("PLIANT_BUILD");
+    char path[512];
+    snprintf(path, sizeof path, "%s/pliant-play", build ? build : "build");
+    if (!realpath(path, program)) {
+        print_error("%s: %s: build it first, or set PLIANT_BUILD\n", path, strerror(errno));
+        return -1;
+    }
+    strcpy(folder, "/tmp/pliant-play-XXXXXX");
+    if (!mkdtemp(folder)) return -1;
+    const pliant_wavelet_def wavelet = pliant_wavelet_default();
+    // 162 vertices, nothing thresholded; and 42 for what takes many steps.
+    check_write_synthetic_model(in_folder("model.h5"), in_folder("dense.h5"), 2, 0, wavelet,
+                                CHECK_ALL_BLOCKS);
+    check_write_synthetic_model(in_folder("free.h5"), in_folder("free-dense.h5"), 2, 0.2, wavelet,
+                                CHECK_FREE_BLOCK);
+    check_write_synthetic_model(in_folder("tiny.h5"), NULL, 1, 0, wavelet, CHECK_FREE_BLOCK);
+    write_text("poke.script", poke);
+    return 0;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    char line[128];
+    snprintf(line, sizeof line, "rm -rf '%s'", folder);
+    return system(line);
+}
+
+// ---- The command line ----
+
+static void help_and_version_go_to_standard_output(void **state)
+{
+    (void)state;
+    check_run(0, "$P --version");
+    assert_string_equal(out, "pliant-play " PLIANT_VERSION_TEXT "\n");
+    check_run(0, "$P -h");
+    const char *const options[] = {"-o, --output", "--frames", "--vtk",     "--force",   "--lod",
+                                   "--repeat",     "--threads", "--compare", "--json",   "--no-verify",
+                                   "-q, --quiet",  "--help",   "--version", "example:"};
+    for (size_t i = 0; i < sizeof options / sizeof *options; i++) check_contains(out, options[i]);
+    const char *const statements[] = {"pliant-script 1", "probe NAME", "displace VERTEX",
+                                      "traction VERTEX", "force VERTEX", "support VERTEX",
+                                      "gravity X Y Z", "release all", "dt SECONDS", "step [COUNT]",
+                                      "expect NAME"};
+    for (size_t i = 0; i < sizeof statements / sizeof *statements; i++)
+        check_contains(out, statements[i]);
+    check_run(0, "$P --help --unknown");
+    check_run(1, "$P --help >/dev/full");
+    check_contains(err, "pliant-play: standard output: No space left on device");
+}
+
+static void misuse_is_told_and_ends_with_status_2(void **state)
+{
+    (void)state;
+    const struct {
+        const char *arguments, *message;
+    } cases[] = {
+        {"", "expected MODEL.h5 [SCRIPT], found nothing; see --help"},
+        {"a b c", "expected MODEL.h5 [SCRIPT], found 'c' too; see --help"},
+        {"--deadline-us 1000 model.h5", "--deadline-us: unknown option; see --help"},
+        {"-z model.h5", "-z: unknown option; see --help"},
+        {"--lod", "--lod: expected a value, found nothing"},
+        {"-o", "-o: expected a value, found nothing"},
+        {"-o '' model.h5", "-o: expected a name, found nothing"},
+        {"--quiet=1 model.h5", "--quiet: expected no value, found --quiet=1"},
+        {"--lod fine model.h5", "--lod: expected a number from 0 to 2147483647, found 'fine'"},
+        {"--lod -1 model.h5", "--lod: expected a number from 0 to 2147483647, found '-1'"},
+        {"--lod 3 model.h5 poke.script",
+         "--lod: expected a number from 0 to 2, the levels of model.h5, found 3"},
+        {"--repeat 0 model.h5 poke.script",
+         "--repeat: expected a number from 1 to 1000000000, found '0'"},
+        {"--repeat 99999999999999999999 model.h5 poke.script",
+         "--repeat: expected a number from 1 to 1000000000, found '99999999999999999999'"},
+        {"--threads 1x model.h5 poke.script", "--threads: expected a number from 1 to 256, found '1x'"},
+        {"--threads 257 model.h5 poke.script", "--threads: expected a number from 1 to 256, found '257'"},
+        {"--repeat 2 model.h5", "--repeat: expected a script file, found standard input"},
+        {"--threads 2 model.h5 -", "--threads: expected a script file, found standard input"},
+        {"--threads 2 model.h5 /dev/null",
+         "--threads: expected a regular file as script, found /dev/null"},
+        {"-o model.h5 model.h5 poke.script",
+         "-o: expected a file of its own, found the input model.h5"},
+        {"--frames ./poke.script model.h5 poke.script",
+         "--frames: expected a file of its own, found the input poke.script"},
+        {"-o x --frames x model.h5", "-o and --frames: expected two files, found x twice"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char expected[256];
+        check_run(2, "$P %s </dev/null", cases[i].arguments);
+        snprintf(expected, sizeof expected, "pliant-play: %s\n", cases[i].message);
+        assert_string_equal(err, expected);
+        assert_string_equal(out, "");
+    }
+}
+
+static void a_model_that_is_none_is_refused(void **state)
+{
+    (void)state;
+    check_run(1, "$P nowhere.h5 poke.script");
+    assert_string_equal(err, "pliant-play: nowhere.h5: No such file or directory\n");
+    check_run(1, "$P dense.h5 poke.script");
+    assert_int_equal(count_lines(err), 1);
+    check_contains(err, "pliant-play: dense.h5: ");
+    check_run(1, "$P model.h5 nowhere.script");
+    assert_string_equal(err, "pliant-play: nowhere.script: No such file or directory\n");
+}
+
+static void checksums_are_verified_unless_told_not_to(void **state)
+{
+    (void)state;
+    // The last byte of a vertex coordinate's mantissa's middle: harmless, but not what was written.
+    pliant_reader *reader;
+    check_ok(pliant_reader_open(in_folder("model.h5"), &reader, NULL), NULL);
+    const unsigned long offset =
+        (unsigned long)pliant_reader_find(reader, "/mesh/vertices")->offset + 8 * 30;
+    pliant_reader_close(reader);
+    check_run(0, "cp model.h5 flipped.h5 && printf '\\001' | "
+                 "dd of=flipped.h5 bs=1 seek=%lu conv=notrunc", offset);
+    check_run(1, "$P flipped.h5 poke.script");
+    check_contains(err, "pliant-play: flipped.h5: ");
+    check_contains(err, "/mesh/vertices");
+    assert_int_equal(count_lines(err), 1);
+    check_run(0, "$P --no-verify flipped.h5 poke.script");
+    check_run(0, "rm flipped.h5");
+}
+
+// ---- What is printed ----
+
+static void a_script_ends_with_a_table(void **state)
+{
+    (void)state;
+    check_run(0, "$P model.h5 poke.script");
+    assert_string_equal(err, "");
+    check_contains(out, "poke.script on model.h5: 7 steps, up to 1 constraint, surface of 162 of "
+                        "162 vertices (level 2 of 0..2)\n");
+    const char *const phases[] = {"capacitance", "contact", "summation", "surface", "total"};
+    for (size_t i = 0; i < sizeof phases / sizeof *phases; i++) {
+        char mark[32];
+        double median, high, worst;
+        snprintf(mark, sizeof mark, "\n%s ", phases[i]);
+        const char *row = strstr(out, mark);
+        assert_non_null(row);
+        assert_int_equal(sscanf(row + strlen(mark), "%lf %lf %lf", &median, &high, &worst), 3);
+        assert_true(0 <= median && median <= high && high <= worst);
+    }
+    int vertex;
+    double x, y, z;
+    assert_int_equal(sscanf(strstr(out, "\nnose "), " nose %d %lf %lf %lf", &vertex, &x, &y, &z), 4);
+    check_near(z, -0.02, 1e-7);
+    assert_int_equal(sscanf(strstr(out, "\ncontact force "), " contact force %lf %lf %lf", &x, &y, &z),
+                     3);
+    check_run(0, "$P -q model.h5 poke.script");
+    assert_string_equal(out, "");
+    write_text("still.script", "pliant-script 1\nprobe p vertex 1\n");
+    check_run(0, "$P model.h5 still.script");
+    assert_string_equal(out, "still.script on model.h5: 0 steps: nothing was solved\n");
+}
+
+static void json_is_one_object_with_what_the_table_says(void **state)
+{
+    (void)state;
+    check_run(0, "$P --json --compare dense.h5 model.h5 poke.script");
+    assert_int_equal(count_lines(out), 1);
+    const char *const parts[] = {"{\"model\":\"model.h5\",\"script\":\"poke.script\",\"steps\":7,",
+                                 "\"constraints_most\":1,\"rough_steps\":0,\"solvers\":1,\"passes\":1,",
+                                 "\"us\":{\"capacitance\":{\"median\":", "\"total\":{\"median\":",
+                                 "\"probes\":{\"nose\":{\"vertex\":", "\"side\":{", "\"force\":[",
+                                 "\"compare\":{\"steps\":7,\"rms\":", "\"force_worst_step\":"};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) check_contains(out, parts[i]);
+    // Brackets match outside strings, and nothing follows the object.
+    char open[64];
+    int depth = 0, in_string = 0;
+    for (const char *c = out; *c; c++) {
+        if (*c == '"') in_string = !in_string;
+        if (in_string) continue;
+        assert_true(depth < 64);
+        if (*c == '{' || *c == '[') open[depth++] = *c;
+        if (*c == '}' || *c == ']') {
+            assert_true(depth > 0 && open[--depth] == (*c == '}' ? '{' : '['));
+            if (depth == 0) assert_string_equal(c + 1, "\n");
+        }
+    }
+    assert_int_equal(depth, 0);
+}
+
+// ---- Streaming ----
+
+typedef struct conversation {
+    pid_t pid;
+    int to, from;
+} conversation;
+
+static conversation start(const char *const *arguments, int is_terminal)
+{
+    int to[2], from[2];
+    assert_int_equal(pipe(from), 0);
+    if (is_terminal) {
+        to[1] = posix_openpt(O_RDWR | O_NOCTTY);
+        assert_true(to[1] >= 0 && grantpt(to[1]) == 0 && unlockpt(to[1]) == 0);
+        to[0] = open(ptsname(to[1]), O_RDWR | O_NOCTTY);
+        assert_true(to[0] >= 0);
+    } else {
+        assert_int_equal(pipe(to), 0);
+    }
+    const pid_t pid = fork();
+    assert_true(pid >= 0);
+    if (pid == 0) {
+        const int messages = open(in_folder("err.txt"), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        if (dup2(to[0], 0) < 0 || dup2(from[1], 1) < 0 || dup2(messages, 2) < 0 ||
+            chdir(folder) != 0)
+            _exit(99);
+        close(to[0]), close(to[1]), close(from[0]), close(from[1]), close(messages);
+        execv(program, (char *const *)arguments);
+        _exit(99);
+    }
+    close(to[0]);
+    close(from[1]);
+    return (conversation){pid, to[1], from[0]};
+}
+
+static void say(const conversation *c, const char *text)
+{
+    assert_int_equal(write(c->to, text, strlen(text)), (ssize_t)strlen(text));
+}
+
+// The next line, which must come while the program's input stays open; "" at the end of its output.
+static const char *hear(const conversation *c)
+{
+    static char line[1024];
+    size_t length = 0;
+    for (;;) {
+        struct pollfd wait = {.fd = c->from, .events = POLLIN};
+        // No answer in 20 s is no answer, on the busiest machine.
+        if (poll(&wait, 1, 20000) != 1) fail_msg("no answer after \"%.*s\"", (int)length, line);
+        if (length + 1 == sizeof line || read(c->from, line + length, 1) != 1) break;
+        if (line[length++] == '\n') break;
+    }
+    line[length] = 0;
+    return line;
+}
+
+static int finish(conversation *c)
+{
+    int status;
+    close(c->to);
+    close(c->from);
+    assert_int_equal(waitpid(c->pid, &status, 0), c->pid);
+    read_text("err.txt", err);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+static void standard_input_is_answered_line_by_line(void **state)
+{
+    (void)state;
+    const char *const arguments[] = {"pliant-play", "model.h5", NULL};
+    conversation c = start(arguments, 0);
+    int step, constraints, level;
+    double time, us, x, y, z, f[3];
+    say(&c, "pliant-script 1\nprobe nose near 0 0 1\n# nothing to say\n");
+    say(&c, "displace near 0 0 1 0 0 -0.5\nstep\n");
+    assert_int_equal(sscanf(hear(&c),
+                            "step %d time %lf us %lf constraints %d level %d nose %lf %lf %lf "
+                            "force %lf %lf %lf",
+                            &step, &time, &us, &constraints, &level, &x, &y, &z, &f[0], &f[1],
+                            &f[2]), 11);
+    assert_int_equal(step, 1);
+    check_near(time, 0.001, 1e-12);
+    assert_int_equal(constraints, 1);
+    assert_int_equal(level, 2);
+    check_near(z, -0.5, 0);
+    assert_true(f[2] < 0);  // it is pushed inwards
+    say(&c, "expect nose 0 0 -0.5 1e-6\n");
+    assert_string_equal(hear(&c), "ok\n");
+    say(&c, "step 2\n");
+    assert_int_equal(sscanf(hear(&c), "step %d", &step), 1);
+    assert_int_equal(step, 2);
+    assert_int_equal(sscanf(hear(&c), "step %d", &step), 1);
+    assert_int_equal(step, 3);
+    say(&c, "expect nose 0 0 0 0.25\n");
+    assert_string_equal(hear(&c), "failed: nose: found 0 0 -0.5, expected 0 0 0: distance 0.5, "
+                                  "tolerance 0.25\n");
+    assert_string_equal(hear(&c), "");  // it has ended
+    check_status(finish(&c), 1, __FILE__, __LINE__);
+    assert_string_equal(err, "pliant-play: standard input:8:8: expect nose: found 0 0 -0.5, expected "
+                             "0 0 0: distance 0.5, tolerance 0.25\n");
+}
+
+static void json_answers_are_lines_too(void **state)
+{
+    (void)state;
+    const char *const arguments[] = {"pliant-play", "--json", "model.h5", "-", NULL};
+    conversation c = start(arguments, 0);
+    say(&c, "pliant-script 1\nprobe nose near 0 0 1\ndisplace near 0 0 1 0 0 -0.5\nstep\n");
+    const char *line = hear(&c);
+    check_contains(line, "{\"step\":1,\"time\":0.001,\"solve_us\":");
+    check_contains(line, "\"constraints\":1,\"level\":2,\"rough\":false,");
+    check_contains(line, "\"probes\":{\"nose\":[0,0,-0.5]},\"force\":[");
+    say(&c, "expect nose 0 0 -0.5 0\n");
+    assert_string_equal(hear(&c), "{\"expect\":\"nose\",\"line\":5,\"met\":true,\"found\":[0,0,-0.5],"
+                                  "\"expected\":[0,0,-0.5],\"distance\":0,\"tolerance\":0}\n");
+    say(&c, "probe late vertex 1\n");
+    assert_string_equal(hear(&c), "");
+    check_status(finish(&c), 1, __FILE__, __LINE__);
+    check_contains(err, "standard input:6:7: probe late after a step: ");
+}
+
+static void a_person_is_told_and_goes_on(void **state)
+{
+    (void)state;
+    const char *const arguments[] = {"pliant-play", "-o", "typed.csv", "model.h5", NULL};
+    conversation c = start(arguments, 1);
+    say(&c, "pliant-script 1\nprobe nose near 0 0 1\nstpe\nexpect nose 0 0 0 1\nstep\n");
+    check_contains(hear(&c), "step 1 ");
+    say(&c, "expect nose 1 0 0 0.5\nstep\n");
+    check_contains(hear(&c), "failed: nose: ");
+    check_contains(hear(&c), "step 2 ");
+    say(&c, "\004");  // end of file at a terminal
+    assert_string_equal(hear(&c), "");
+    check_status(finish(&c), 1, __FILE__, __LINE__);
+    assert_int_equal(count_lines(err), 3);
+    check_contains(err, "pliant-play: standard input:3:1: ");
+    check_contains(err, "pliant-play: standard input:4:8: probe nose has no displacement yet");
+    check_contains(err, "pliant-play: standard input:6:8: expect nose: ");
+    // What was played stands.
+    read_text("typed.csv", out);
+    assert_int_equal(count_lines(out), 3);
+    unlink(in_folder("typed.csv"));
+}
+
+static void a_closed_pipe_ends_it_quietly(void **state)
+{
+    (void)state;
+    const char *const arguments[] = {"pliant-play", "-o", "pipe.csv", "model.h5", NULL};
+    conversation c = start(arguments, 0);
+    say(&c, "pliant-script 1\nstep 1000000000\n");
+    check_contains(hear(&c), "step 1 ");
+    check_status(finish(&c), 128 + SIGPIPE, __FILE__, __LINE__);
+    assert_string_equal(err, "");
+    assert_false(exists("pipe.csv"));
+    assert_false(exists("pipe.csv.tmp"));
+}
+
+// ---- Mistakes in scripts ----
+
+static void mistakes_name_file_line_and_column(void **state)
+{
+    (void)state;
+    char expected[256];
+    const struct {
+        const char *text, *message;
+    } cases[] = {
+        {"step\n", "1:1: expected \"pliant-script 1\" as first statement, found \"step\""},
+        {"pliant-script 1\ndisplace 99999 0 0 -0.02\n", "2:10: vertex 99999 of 162"},
+        {"pliant-script 1\n\n  displace 1 0 0\n", "3:17: expected z, a number, found the end of the line"},
+        {"pliant-script 1\nstep 0\n", "2:6: expected a number of steps, 1 or more, found \"0\""},
+        {"pliant-script 1\njump\n", "2:1: expected "},
+        {"pliant-script 1\nprobe p vertex 1\nexpect p 0 0 0 1\n",
+         "3:8: probe p has no displacement yet: expected a step before"},
+        {"pliant-script 1\nstep\nexpect q 0 0 0 1\n", "3:8: no probe q: expected one declared before"},
+        {"pliant-script 1\nprobe p vertex 1\nprobe p vertex 2\n",
+         "3:7: probe p is already there: expected another name"},
+        {"pliant-script 1\nrelease source 70000\n", "2:9: source vertex 70000 is not in the model"},
+        {"pliant-script 1\nforce 5:1 0 0 1\n", "2:7: level 5: expected 0 to 2"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_text("bad.script", cases[i].text);
+        check_run(1, "$P -o bad.csv model.h5 bad.script");
+        snprintf(expected, sizeof expected, "pliant-play: bad.script:%s", cases[i].message);
+        assert_memory_equal(err, expected, strlen(expected));
+        assert_int_equal(count_lines(err), 1);
+        assert_string_equal(out, "");
+        assert_false(exists("bad.csv"));
+        assert_false(exists("bad.csv.tmp"));
+    }
+}
+
+static void a_line_without_end_is_refused_in_bounded_memory(void **state)
+{
+    (void)state;
+    check_run(1, "{ echo 'pliant-script 1'; head -c 50000000 /dev/zero | tr '\\0' 7; } | "
+                 "{ ulimit -d 60000; $P model.h5; }");
+    check_contains(err, "pliant-play: standard input:2:");
+    assert_int_equal(count_lines(err), 1);
+}
+
+static void a_million_lines_play_in_the_memory_of_a_few(void **state)
+{
+    (void)state;
+    // Half of them steps. What a run has resident at most, by its own account to the kernel.
+    check_run(0, "{ echo 'pliant-script 1'; echo 'probe p near 0 0 1'; echo 'displace near 0 0 1 0 0 1'; "
+                 "echo step; } >few.script");
+    FILE *script = fopen(in_folder("many.script"), "w");
+    assert_non_null(script);
+    fputs("pliant-script 1\nprobe p near 0 0 1\n", script);
+    for (int i = 0; i < 500000; i++)
+        fprintf(script, "displace near 0 0 1 0 0 -0.%03d\nstep\n", i % 1000);
+    assert_int_equal(fclose(script), 0);
+    long resident[2];
+    const char *const names[] = {"few.script", "many.script"};
+    for (int i = 0; i < 2; i++) {
+        const pid_t pid = fork();
+        assert_true(pid >= 0);
+        if (pid == 0) {
+            const int nothing = open("/dev/null", O_WRONLY);
+            if (chdir(folder) != 0 || dup2(nothing, 1) < 0) _exit(99);
+            execl(program, "pliant-play", "-o", "many.csv", "tiny.h5", names[i], (char *)NULL);
+            _exit(99);
+        }
+        int status;
+        struct rusage usage;
+        assert_int_equal(wait4(pid, &status, 0, &usage), pid);
+        assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+        resident[i] = usage.ru_maxrss;
+    }
+    // kB. What a page of code or a buffer more may take; the script has 18 MB, its rows 30.
+    check_at_most((double)(resident[1] - resident[0]), 2048);
+    check_run(0, "wc -l <many.csv; rm many.csv many.script few.script");
+    assert_int_equal(atoi(out), 500001);
+}
+
+static void a_failed_expectation_ends_the_play_with_status_1(void **state)
+{
+    (void)state;
+    write_text("fail.script", "pliant-script 1\nprobe nose near 0 0 1\ndisplace near 0 0 1 0 0 -0.5\n"
+                              "step\nexpect nose 0 0 -0.5 0\nexpect nose 0 0 -0.25 0.125\nstep\n");
+    write_text("kept.csv", "mine\n");
+    check_run(1, "$P -o kept.csv --frames fail.h5 --vtk fail model.h5 fail.script");
+    assert_string_equal(err, "pliant-play: fail.script:6:8: expect nose: found 0 0 -0.5, expected 0 "
+                             "0 -0.25: distance 0.25, tolerance 0.125\n");
+    assert_string_equal(out, "");
+    // No output of a failed play, and what stood there stays.
+    read_text("kept.csv", out);
+    assert_string_equal(out, "mine\n");
+    assert_false(exists("kept.csv.tmp") || exists("fail.h5") || exists("fail.h5.tmp") ||
+                 exists("fail"));
+    check_run(0, "ls");
+    assert_null(strstr(out, "fail.h5"));
+}
+
+// ---- Outputs ----
+
+static void csv_has_the_promised_columns(void **state)
+{
+    (void)state;
+    check_run(0, "$P -o poke.csv model.h5 poke.script");
+    read_text("poke.csv", out);
+    assert_false(exists("poke.csv.tmp"));
+    assert_int_equal(count_lines(out), 8);
+    const char *row = strchr(out, '\n') + 1;
+    assert_memory_equal(out,
+                        "step,time,solve_us,constraints,level,nose.x,nose.y,nose.z,side.x,side.y,"
+                        "side.z,force.x,force.y,force.z\n",
+                        (size_t)(row - out));
+    const double times[] = {0.001, 0.002, 0.003, 0.004, 0.014, 0.024, 0.034};
+    for (int i = 0; i < 7; i++, row = strchr(row, '\n') + 1) {
+        double v[14];
+        int length;
+        for (int k = 0; k < 14; k++) {
+            assert_int_equal(sscanf(row, "%lf%n", &v[k], &length), 1);
+            row += length;
+            assert_int_equal(*row, k < 13 ? ',' : '\n');
+            row += k < 13;
+        }
+        check_near(v[0], i + 1, 0);
+        check_near(v[1], times[i], 1e-12);
+        assert_true(v[2] > 0);
+        check_near(v[3], 1, 0);
+        check_near(v[4], 2, 0);
+        check_near(v[7], -0.02f, 0);  // nine digits bring back the float
+    }
+    write_text("still.script", "pliant-script 1\nprobe p vertex 1\n");
+    check_run(0, "$P -q -o poke.csv model.h5 still.script");
+    read_text("poke.csv", out);
+    assert_string_equal(out, "step,time,solve_us,constraints,level,p.x,p.y,p.z,force.x,force.y,"
+                             "force.z\n");
+    check_run(0, "rm poke.csv; $P -q -o /dev/stdout model.h5 poke.script");
+    assert_int_equal(count_lines(out), 8);
+    write_text("late.script", "pliant-script 1\nstep\nprobe p vertex 1\n");
+    check_run(1, "$P -o late.csv model.h5 late.script");
+    check_contains(err, "late.script:3:7: probe p after a step: ");
+    check_run(0, "$P model.h5 late.script");
+}
+
+#ifndef PLIANT_WITHOUT_HDF5
+static void frames_hold_every_surface(void **state)
+{
+    (void)state;
+    const struct {
+        const char *how;
+        uint64_t vertex_count;
+    } cases[] = {{"model.h5 poke.script", 162},
+                 {"model.h5 - <poke.script", 162},
+                 {"--lod 1 model.h5 poke.script", 42}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        check_run(0, "$P -q -o frames.csv --frames frames.h5 %s", cases[i].how);
+        pliant_error reason;
+        pliant_reader *reader;
+        check_ok(pliant_reader_open(in_folder("frames.h5"), &reader, &reason), &reason);
+        check_ok(pliant_reader_verify(reader, &reason), &reason);
+        const pliant_section *u = pliant_reader_find(reader, "/displacement");
+        const pliant_section *step = pliant_reader_find(reader, "/step");
+        const pliant_section *us = pliant_reader_find(reader, "/solve_us");
+        const pliant_section *time = pliant_reader_find(reader, "/time");
+        assert_true(u && step && us && time);
+        assert_true(u->type == PLIANT_F4 && u->rank == 3);
+        assert_true(u->shape[0] == 7 && u->shape[1] == cases[i].vertex_count && u->shape[2] == 3);
+        assert_true(step->type == PLIANT_U8 && us->type == PLIANT_F8 && time->type == PLIANT_F8);
+        // The displaced vertex, and the solve times that the table has too.
+        read_text("frames.csv", out);
+        const char *row = out;
+        double deepest = 0;
+        for (int s = 0; s < 7; s++) {
+            double number, seconds, solve_us;
+            row = strchr(row, '\n') + 1;
+            assert_int_equal(sscanf(row, "%lf,%lf,%lf", &number, &seconds, &solve_us), 3);
+            assert_int_equal(((const uint64_t *)step->data)[s], s + 1);
+            check_near(((const double *)time->data)[s], seconds, 1e-12);
+            check_near(((const double *)us->data)[s], solve_us, 0.001);
+        }
+        const float *z = (const float *)u->data + 6 * 3 * u->shape[1] + 2;
+        for (uint64_t v = 0; v < u->shape[1]; v++, z += 3)
+            if ((double)*z < deepest) deepest = (double)*z;
+        check_at_most(deepest, -0.02 + 1e-8);
+        pliant_reader_close(reader);
+    }
+    check_run(0, "command -v h5dump >/dev/null || { echo '( 7, 42, 3 )'; exit 0; }; "
+                 "h5dump -H -d /displacement frames.h5");
+    check_contains(out, "( 7, 42, 3 )");
+    // Without a step: datasets of no elements.
+    write_text("still.script", "pliant-script 1\n");
+    check_run(0, "$P -q --frames frames.h5 model.h5 still.script");
+    check_run(0, "ls -a; rm frames.h5 frames.csv");
+    assert_null(strstr(out, "frames.h5."));
+}
+#endif
+
+static void vtk_series_opens(void **state)
+{
+    (void)state;
+    check_run(0, "$P -q --vtk series model.h5 poke.script && $P -q --vtk series --lod 1 model.h5 poke.script");
+    check_run(0, "cat series/pliant.pvd");
+    int count = 0;
+    for (const char *at = out; (at = strstr(at, "<DataSet ")); at++) count++;
+    assert_int_equal(count, 7);
+    check_contains(out, "<DataSet timestep=\"0.034\" part=\"0\" file=\"pliant_00000007.vtp\"/>");
+    check_run(0, "cat series/pliant_00000007.vtp");
+    check_contains(out, "NumberOfPoints=\"42\"");
+    check_run(0, "command -v xmllint >/dev/null || exit 0; xmllint --noout series/*.vtp series/*.pvd");
+    assert_string_equal(err, "");
+    check_run(0, "touch series/theirs.vtu");
+    check_run(1, "$P -q --vtk series model.h5 poke.script");
+    check_contains(err, "pliant-play: series: holds another series (theirs.vtu)");
+    check_run(0, "$P -q --force --vtk series free.h5 poke.script && ls series");
+    check_contains(out, "theirs.vtu");
+    check_run(0, "rm -r series");
+}
+
+static void comparison_with_the_dense_file_is_float_accurate(void **state)
+{
+    (void)state;
+    double rms, worst, max, force;
+    int step;
+    check_run(0, "$P --compare dense.h5 model.h5 poke.script");
+    const char *text = strstr(out, "against the dense solution, 7 steps:\n");
+    assert_non_null(text);
+    assert_int_equal(sscanf(strstr(text, "RMS difference"),
+                            "RMS difference %lf over all steps, worst %lf at step %d", &rms, &worst,
+                            &step), 3);
+    assert_int_equal(sscanf(strstr(text, "MAX difference"), "MAX difference worst %lf", &max), 1);
+    assert_int_equal(sscanf(strstr(text, "force difference"), "force difference worst %lf", &force), 1);
+    // Nothing is thresholded: float coefficients and sums, some ten roundings of 2^-24 = 6e-8.
+    check_at_most(rms, 2e-6);
+    check_at_most(worst, 5e-6);
+    check_at_most(max, 5e-6);
+    check_at_most(force, 5e-6);
+    assert_true(step >= 1 && step <= 7);
+
+    // Of a compressed model it says the compression's error, here from standard input.
+    check_run(0, "$P -q --compare free-dense.h5 free.h5 <poke.script");
+    assert_int_equal(sscanf(strstr(out, "RMS difference"), "RMS difference %lf", &rms), 1);
+    check_at_least(rms, 1e-4);
+    check_at_most(rms, 0.5);
+
+    check_run(1, "$P --compare model.h5 model.h5 poke.script");
+    check_contains(err, "pliant-play: model.h5: not a dense file");
+    check_run(1, "$P --compare free-dense.h5 tiny.h5 poke.script");
+    check_contains(err, "free-dense.h5:/dense/nodes: expected the model's");
+}
+
+static void repeats_and_threads_play_the_same_and_count_all(void **state)
+{
+    (void)state;
+    check_run(0, "$P --repeat 5 --threads 3 -o many.csv model.h5 poke.script");
+    check_contains(out, "poke.script on model.h5: 7 steps, ");
+    check_contains(out, "3 solvers at once x 5 passes: 105 steps in ");
+    check_contains(out, "\nfirst passes ");
+    check_run(0, "cut -d, -f1,2,4- many.csv >many.txt; $P -q -o one.csv model.h5 poke.script; "
+                 "cut -d, -f1,2,4- one.csv | cmp - many.txt");
+    check_run(0, "$P --json --repeat 2 --threads 2 model.h5 poke.script");
+    check_contains(out, "\"solvers\":2,\"passes\":2,\"steps_played\":28,");
+    check_contains(out, "\"first_passes_us\":{");
+    // A failure of any ends all, with one message.
+    write_text("fail.script", "pliant-script 1\nprobe p vertex 1\nstep 100\nexpect p 1 1 1 0\n");
+    check_run(1, "$P --repeat 1000 --threads 4 model.h5 fail.script");
+    assert_int_equal(count_lines(err), 1);
+    check_contains(err, "fail.script:4:8: expect p: ");
+    check_run(0, "rm many.csv one.csv many.txt");
+}
+
+static void outputs_that_cannot_be_written_are_told(void **state)
+{
+    (void)state;
+    check_run(1, "$P -o no/where.csv model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: no/where.csv: No such file or directory\n");
+    check_run(1, "$P -o . model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: .: Is a directory\n");
+    check_run(1, "$P --vtk no/where model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: no/where: No such file or directory\n");
+    check_run(1, "$P -o /dev/full model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: /dev/full: No space left on device\n");
+    check_run(1, "$P model.h5 poke.script >/dev/full");
+    assert_string_equal(err, "pliant-play: standard output: No space left on device\n");
+    check_run(1, "$P model.h5 <poke.script >/dev/full");
+    assert_string_equal(err, "pliant-play: standard output: No space left on device\n");
+#ifndef PLIANT_WITHOUT_HDF5
+    check_run(1, "$P --frames no/where.h5 model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: no/where.h5: No such file or directory\n");
+    check_run(1, "$P --frames /dev/full model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: /dev/full: not a regular file\n");
+#endif
+}
+
+// A limit on a file's size stands for a disk that fills up while playing.
+static void a_full_disk_leaves_nothing_under_the_names(void **state)
+{
+    (void)state;
+    write_text("long.script", "pliant-script 1\nprobe p near 0 0 1\nstep 2000\n");
+    check_run(1, "ulimit -f 40; $P -o full.csv model.h5 long.script");
+    assert_string_equal(err, "pliant-play: full.csv: File too large\n");
+    check_run(1, "ulimit -f 1; $P --vtk full model.h5 long.script");
+    check_contains(err, "pliant-play: full/pliant.tmp/pliant_00000001.vtp: File too large\n");
+#ifndef PLIANT_WITHOUT_HDF5
+    check_run(1, "ulimit -f 40; $P --frames full.h5 model.h5 long.script");
+    check_contains(err, "pliant-play: full.h5: spooling step ");
+    // The spool of one step fits, the file with its user block does not.
+    write_text("short.script", "pliant-script 1\nstep\n");
+    check_run(1, "ulimit -f 20; $P --frames full.h5 model.h5 short.script");
+    check_contains(err, "pliant-play: full.h5");
+    assert_int_equal(count_lines(err), 1);
+#endif
+    check_run(0, "ls -a");
+    assert_null(strstr(out, "full"));
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(help_and_version_go_to_standard_output),
+        cmocka_unit_test(misuse_is_told_and_ends_with_status_2),
+        cmocka_unit_test(a_model_that_is_none_is_refused),
+        cmocka_unit_test(checksums_are_verified_unless_told_not_to),
+        cmocka_unit_test(a_script_ends_with_a_table),
+        cmocka_unit_test(json_is_one_object_with_what_the_table_says),
+        cmocka_unit_test(standard_input_is_answered_line_by_line),
+        cmocka_unit_test(json_answers_are_lines_too),
+        cmocka_unit_test(a_person_is_told_and_goes_on),
+        cmocka_unit_test(a_closed_pipe_ends_it_quietly),
+        cmocka_unit_test(mistakes_name_file_line_and_column),
+        cmocka_unit_test(a_line_without_end_is_refused_in_bounded_memory),
+        cmocka_unit_test(a_million_lines_play_in_the_memory_of_a_few),
+        cmocka_unit_test(a_failed_expectation_ends_the_play_with_status_1),
+        cmocka_unit_test(csv_has_the_promised_columns),
+#ifndef PLIANT_WITHOUT_HDF5
+        cmocka_unit_test(frames_hold_every_surface),
+#endif
+        cmocka_unit_test(vtk_series_opens),
+        cmocka_unit_test(comparison_with_the_dense_file_is_float_accurate),
+        cmocka_unit_test(repeats_and_threads_play_the_same_and_count_all),
+        cmocka_unit_test(outputs_that_cannot_be_written_are_told),
+        cmocka_unit_test(a_full_disk_leaves_nothing_under_the_names),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
