@@ -198,10 +198,13 @@ TEST_SRC  := $(sort $(wildcard tests/common/test_*.c tests/formats/test_*.c test
 ifneq ($(HAVE_PETSC),yes)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif
+ifneq ($(HAVE_PNG),yes)
+TEST_SRC  := $(filter-out tests/runtime/test_draw.c,$(TEST_SRC))
+endif
 TESTS     := $(patsubst tests/%.c,$(OUT)/tests/%,$(filter $(wildcard tests/*/test_$(T).c),$(TEST_SRC)))
 BENCHES   := $(patsubst tests/%.c,$(OUT)/tests/%,$(sort $(wildcard tests/bench/bench_*.c)))
 
-TEST_LIBS := $(LIB_support) $(LIB_play) $(LIB_info) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
+TEST_LIBS := $(LIB_support) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_play) $(LIB_info) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 $(OUT)/tests/precompute/%: $(OBJ)/tests/precompute/%.o $(LIB_support) $(LIB_precompute) $(LIB_pliant) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(CMOCKA_LIBS) $(ASSIMP_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/bench/%: $(OBJ)/tests/bench/%.o $(LIB_support) $(if $(HAVE_PETSC),$(LIB_precompute)) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)

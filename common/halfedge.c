@@ -29,7 +29,8 @@ static pliant_status sort_by_origin(int32_t vertex_count, int32_t face_count, co
                                     offset[v + 1]);
         offset[v + 1] += offset[v];
     }
-    // Filling moves offset[v] to the end of v's part, which is where v + 1 begins: shift back after.
+    // Filling moves offset[v] to the end of v's part, which is where v + 1 begins: shift back
+    // after.
     for (int32_t h = 0; h < 3 * face_count; h++) leaving[offset[faces[h]]++] = h;
     for (int32_t v = vertex_count; v > 0; v--) offset[v] = offset[v - 1];
     offset[0] = 0;

@@ -151,7 +151,8 @@ static int32_t corner_across(const pliant_hierarchy *h, int32_t l, const int32_t
 static void fill_stencils(pliant_hierarchy *h, int32_t l, const int32_t *sides)
 {
     const int32_t *face = h->faces[l];
-    pliant_stencil *stencils = (pliant_stencil *)h->stencils + h->vertex_count[l] - h->vertex_count[0];
+    pliant_stencil *stencils =
+        (pliant_stencil *)h->stencils + h->vertex_count[l] - h->vertex_count[0];
     const int32_t odd_count = h->vertex_count[l + 1] - h->vertex_count[l];
     for (int32_t i = 0; i < odd_count; i++) {
         const int32_t up = sides[2 * (size_t)i], down = sides[2 * (size_t)i + 1];

@@ -67,28 +67,38 @@ static size_t lay_out(char *block, const pliant_wavelet *w, plan_arrays *arrays)
 }
 
 // The prediction of one odd vertex: `node` and `weight` of stencil_size entries.
+//
 // Zero extension keeps every weight and reads the zero row outside the domain. Dropping divides the
-// weights inside by their sum.
+// weights inside by their sum; where too little of a butterfly is inside, its nearest ring that has
+// nodes inside (parents, opposite corners, wings) predicts by their mean, so that constants keep
+// having no details.
 static void plan_prediction(const pliant_wavelet *w, const pliant_stencil *stencil,
                             const int32_t *position, int32_t *node, double *weight)
 {
+    static const int32_t ring_end[] = {2, 4, 8};
     const int32_t *vertices = stencil->parents;  // the stencil's eight numbers follow each other
     const int32_t size = w->stencil_size;
-    double inside = 0, parents_inside = 0;
+    double inside = 0;
     for (int32_t k = 0; k < size; k++) {
         node[k] = position[vertices[k]];
         weight[k] = butterfly_weights[k];
-        if (node[k] == w->count) continue;
-        inside += weight[k];
-        if (k < 2) parents_inside += weight[k];
+        if (node[k] < w->count) inside += weight[k];
     }
     if (w->def.boundary == PLIANT_ZERO) return;
 
-    const int parents_only = size > 2 && inside < least_butterfly_weight;
-    const double sum = parents_only ? parents_inside : inside;
+    int32_t begin = 0, end = size;
+    if (size > 2 && inside < least_butterfly_weight) {
+        inside = 0;
+        for (int ring = 0; ring < 3 && inside == 0; ring++) {
+            begin = ring == 0 ? 0 : ring_end[ring - 1];
+            end = ring_end[ring];
+            for (int32_t k = begin; k < end; k++) inside += node[k] < w->count;
+        }
+        for (int32_t k = begin; k < end; k++) weight[k] = 1;
+    }
     for (int32_t k = 0; k < size; k++) {
-        const int dropped = node[k] == w->count || sum == 0 || (parents_only && k >= 2);
-        weight[k] = dropped ? 0 : weight[k] / sum;
+        const int dropped = node[k] == w->count || k < begin || k >= end;
+        weight[k] = dropped ? 0 : weight[k] / inside;
         if (dropped) node[k] = w->count;
     }
 }

@@ -2,8 +2,8 @@
 #include "pliant/model_view.h"
 
 #include "pliant/error.h"
+#include "pliant/utf8.h"
 #include "bind.h"
-#include "utf8.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -5,7 +5,7 @@
 #include "pliant/script.h"
 
 #include "pliant/error.h"
-#include "utf8.h"
+#include "pliant/utf8.h"
 
 #include <float.h>
 #include <math.h>

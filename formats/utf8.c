@@ -1,5 +1,5 @@
 // utf8.c: well-formed UTF-8, as RFC 3629 section 4 defines it.
-#include "utf8.h"
+#include "pliant/utf8.h"
 
 int pliant_utf8_character(const char *text, size_t length)
 {

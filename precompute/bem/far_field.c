@@ -83,9 +83,9 @@ PLIANT_LANES_INLINE void add_element(const pliant_kelvin_constants *constants,
 }
 
 PLIANT_VECTOR_CLONES
-void pliant_far_field_add(const pliant_kelvin_constants *constants, const pliant_element *elements,
-                          int32_t element_count, const pliant_lanes x[3], pliant_row_sum *sums,
-                          pliant_lanes body[3][3], uint8_t *near)
+static void add_elements(const pliant_kelvin_constants *constants, const pliant_element *elements,
+                         int32_t element_count, const pliant_lanes x[3], pliant_row_sum *sums,
+                         pliant_lanes body[3][3], uint8_t *near)
 {
     const rule quadrature = rule_from(pliant_triangle_rule_of_degree(5));
     for (int32_t e = 0; e < element_count; e++) {
@@ -114,4 +114,11 @@ void pliant_far_field_add(const pliant_kelvin_constants *constants, const pliant
                 for (int r = 0; r < 3; r++)
                     body[r][c] += element->loads[k][c] * U[k][pliant_integral_place[r][c]];
     }
+}
+
+void pliant_far_field_add(const pliant_kelvin_constants *constants, const pliant_element *elements,
+                          int32_t element_count, const pliant_lanes x[3], pliant_row_sum *sums,
+                          pliant_lanes body[3][3], uint8_t *near)
+{
+    add_elements(constants, elements, element_count, x, sums, body, near);
 }

@@ -81,9 +81,8 @@ PLIANT_LANES_INLINE void add_leaf(const pliant_kelvin_constants *constants,
 }
 
 PLIANT_VECTOR_CLONES
-void pliant_near_integral_set(const pliant_kelvin_constants *constants,
-                              const pliant_element *element, const double x[3],
-                              pliant_element_integrals *integrals)
+static void integrate(const pliant_kelvin_constants *constants, const pliant_element *element,
+                      const double x[3], pliant_element_integrals *integrals)
 {
     table quadrature;
     const pliant_triangle_rule *rule = pliant_triangle_rule_of_degree(8);
@@ -134,4 +133,11 @@ void pliant_near_integral_set(const pliant_kelvin_constants *constants,
             for (int lane = 0; lane < PLIANT_LANES; lane++) sum += sums[k][m][lane];
             integrals->of_hat[k][m] = sum;
         }
+}
+
+void pliant_near_integral_set(const pliant_kelvin_constants *constants,
+                              const pliant_element *element, const double x[3],
+                              pliant_element_integrals *integrals)
+{
+    integrate(constants, element, x, integrals);
 }

@@ -1,11 +1,11 @@
 // connectivity.c: find the levels of a mesh that somebody subdivided, in whatever order it comes.
 //
-// This follows: G. Taubin, Detecting and reconstructing subdivision connectivity, The Visual Computer
-// 18, 2002: a mesh is one 4-to-1 refinement exactly if its faces can be covered by tiles of a middle
-// face and the three around it. We grow the coarse (even) vertices instead of the tiles. All
-// neighbours of an even vertex are odd; an odd vertex has six neighbours, of which those straight
-// ahead and straight back are even. So one even vertex decides about its whole component, in linear
-// time, and a contradiction proves that it is not even.
+// This follows: G. Taubin, Detecting and reconstructing subdivision connectivity, The Visual
+// Computer 18, 2002: a mesh is one 4-to-1 refinement exactly if its faces can be covered by tiles
+// of a middle face and the three around it. We grow the coarse (even) vertices instead of the
+// tiles. All neighbours of an even vertex are odd; an odd vertex has six neighbours, of which those
+// straight ahead and straight back are even. So one even vertex decides about its whole component,
+// in linear time, and a contradiction proves that it is not even.
 //
 // No choice is left to try. An odd vertex has valence 6, so any other valence marks an even vertex;
 // and a component of valence 6 throughout is a torus whose triangulation is a lattice modulo
@@ -26,8 +26,8 @@ typedef struct level {
     int32_t vertex_count, face_count;
     int32_t *faces;     // [face_count][3]
     int32_t *origin;    // [vertex_count]: the input's vertex, ascending
-    int32_t *children;  // [face_count][4]: faces of the next finer level at corners 0, 1, 2 and in the
-                        // middle; the middle face begins with the midpoint of corners 0 and 1
+    int32_t *children;  // [face_count][4]: faces of the next finer level at corners 0, 1, 2 and in
+                        // the middle; the middle face begins with the midpoint of corners 0 and 1
 } level;
 
 // What covering needs; sized for the input and used again by every level.
@@ -113,20 +113,21 @@ static pliant_status cover_component(cover *c, const level *l, int32_t seed, pli
             // Straight on through m: half of its six half-edges further.
             const int32_t ahead = turn(c, turn(c, turn(c, c->twin[h]))), b = head(l, ahead);
             if (c->valence[m] != 6)
-                return pliant_error_set(why, PLIANT_ERR_MISSING,
-                                        "vertex %d of valence %d would be the midpoint of an edge "
-                                        "from vertex %d of valence %d, if vertex %d of valence %d is "
-                                        "a coarse one",
-                                        l->origin[m], c->valence[m], l->origin[v], c->valence[v],
-                                        l->origin[seed], c->valence[seed]);
+                return pliant_error_set(
+                    why, PLIANT_ERR_MISSING,
+                    "vertex %d of valence %d would be the midpoint of an edge "
+                    "from vertex %d of valence %d, if vertex %d of valence %d is "
+                    "a coarse one",
+                    l->origin[m], c->valence[m], l->origin[v], c->valence[v], l->origin[seed],
+                    c->valence[seed]);
             if (c->parity[m] == EVEN || c->parity[b] == ODD)
-                return pliant_error_set(why, PLIANT_ERR_MISSING,
-                                        "vertex %d of valence %d would be both an end and the "
-                                        "midpoint of a coarse edge, if vertex %d of valence %d is a "
-                                        "coarse one",
-                                        l->origin[c->parity[m] == EVEN ? m : b],
-                                        c->valence[c->parity[m] == EVEN ? m : b], l->origin[seed],
-                                        c->valence[seed]);
+                return pliant_error_set(
+                    why, PLIANT_ERR_MISSING,
+                    "vertex %d of valence %d would be both an end and the "
+                    "midpoint of a coarse edge, if vertex %d of valence %d is a "
+                    "coarse one",
+                    l->origin[c->parity[m] == EVEN ? m : b],
+                    c->valence[c->parity[m] == EVEN ? m : b], l->origin[seed], c->valence[seed]);
             c->parity[m] = ODD;
             if (!c->parity[b]) {
                 c->parity[b] = EVEN;
@@ -175,7 +176,8 @@ static void build_coarse(const cover *c, const level *fine, level *coarse)
     for (int32_t f = 0; f < fine->face_count; f++) {
         const int32_t *m = fine->faces + 3 * (size_t)f;
         if (c->parity[m[0]] != ODD || c->parity[m[1]] != ODD || c->parity[m[2]] != ODD) continue;
-        int32_t *face = coarse->faces + 3 * (size_t)count, *child = coarse->children + 4 * (size_t)count;
+        int32_t *face = coarse->faces + 3 * (size_t)count,
+                *child = coarse->children + 4 * (size_t)count;
         for (int32_t k = 0; k < 3; k++) {
             // Corner k lies across the side that arrives at midpoint k.
             const int32_t across = c->twin[3 * f + (k + 2) % 3];
@@ -195,7 +197,8 @@ static pliant_status coarsen(cover *c, const level *fine, level *coarse, pliant_
     for (int32_t i = 0; i < c->component_count; i++) {
         // The first contradiction is told; the rest are only looked for, to say who could go on.
         const int32_t refused_before = c->refused_component >= 0;
-        const pliant_status status = cover_component(c, fine, c->seed[i], refused_before ? NULL : why);
+        const pliant_status status =
+            cover_component(c, fine, c->seed[i], refused_before ? NULL : why);
         if (status < 0 && !refused_before) c->refused_component = i;
         if (status == PLIANT_OK && c->covered_component < 0) c->covered_component = i;
     }
@@ -212,8 +215,10 @@ static pliant_status coarsen(cover *c, const level *fine, level *coarse, pliant_
     status = pliant_halfedge_match(coarse->vertex_count, coarse->face_count, coarse->faces, c->twin,
                                    &detail);
     if (status == PLIANT_OK || status == PLIANT_ERR_MEMORY) return status;
-    return pliant_error_set(why, PLIANT_ERR_MISSING, "the coarser level of %d vertices is no closed "
-                            "manifold mesh", coarse->vertex_count);
+    return pliant_error_set(why, PLIANT_ERR_MISSING,
+                            "the coarser level of %d vertices is no closed "
+                            "manifold mesh",
+                            coarse->vertex_count);
 }
 
 // ---- The result, coarse to fine ----
@@ -230,7 +235,8 @@ static void number_vertices(const level *levels, int32_t level_count, int32_t *n
 }
 
 // Put the base faces in the order of the first input face in each. `order` takes sides: 3 times the
-// face plus the corner to begin with, which is 0. `scratch`, `first` have room for the input's faces.
+// face plus the corner to begin with, which is 0. `scratch`, `first` have room for the input's
+// faces.
 static void order_base(const level *levels, int32_t level_count, int32_t *order, int32_t *scratch,
                        int32_t *first)
 {
@@ -253,14 +259,15 @@ static void order_base(const level *levels, int32_t level_count, int32_t *order,
         if (scratch[f] >= 0) order[count++] = 3 * scratch[f];
 }
 
-// From the ordered sides of a level to those of the next finer one (hierarchy.h's child order), from
-// the last on, in place; and the parents of the odd vertices between.
+// From the ordered sides of a level to those of the next finer one (hierarchy.h's child order),
+// from the last on, in place; and the parents of the odd vertices between.
 static void descend(const level *coarse, const level *fine, const int32_t *number,
                     int32_t base_count, int32_t *order, int32_t (*parents)[2])
 {
     for (int32_t i = coarse->face_count - 1; i >= 0; i--) {
         const int32_t f = order[i] / 3, begin = order[i] % 3;
-        const int32_t *corners = coarse->faces + 3 * (size_t)f, *child = coarse->children + 4 * (size_t)f;
+        const int32_t *corners = coarse->faces + 3 * (size_t)f,
+                      *child = coarse->children + 4 * (size_t)f;
         const int32_t *middle = fine->faces + 3 * (size_t)child[3];
         for (int32_t k = 0; k < 3; k++) {
             const int32_t at = (begin + k) % 3, input = coarse->origin[corners[at]];
@@ -282,8 +289,8 @@ static pliant_status assemble(const pliant_mesh *mesh, const level *levels, int3
                               cover *c, pliant_multires **multires, pliant_error *err)
 {
     pliant_multires *m = NULL;
-    pliant_status status = pliant_multires_create(levels[0].vertex_count, levels[0].face_count,
-                                                  level_count, &m, err);
+    pliant_status status =
+        pliant_multires_create(levels[0].vertex_count, levels[0].face_count, level_count, &m, err);
     if (status < 0) return status;
     int32_t *number = c->number, *order = m->mesh->faces;
     number_vertices(levels, level_count, number);
@@ -342,8 +349,8 @@ static void release_cover(cover *c)
     free(c->twin);
 }
 
-// Levels from the input (finest[0]) downwards: finest[-1], finest[-2], ... PLIANT_ERR_MISSING is how
-// it ends; `why` says what stopped it.
+// Levels from the input (finest[0]) downwards: finest[-1], finest[-2], ... PLIANT_ERR_MISSING is
+// how it ends; `why` says what stopped it.
 static pliant_status find_levels(cover *c, level *finest, int32_t *coarser_count, pliant_error *why)
 {
     pliant_status status = PLIANT_OK;
@@ -377,19 +384,21 @@ pliant_status pliant_multires_detect(const pliant_mesh *mesh, pliant_multires **
         goto done;
     }
     if (coarser_count == 0) {
-        status = pliant_error_set(err, PLIANT_ERR_MISSING,
-                                  "no subdivision connectivity: %.300s; take the mesh as a base mesh "
-                                  "with --subdivide L",
-                                  why.text);
+        status =
+            pliant_error_set(err, PLIANT_ERR_MISSING,
+                             "no subdivision connectivity: %.300s; take the mesh as a base mesh "
+                             "with --subdivide L",
+                             why.text);
         goto done;
     }
     status = assemble(mesh, finest - coarser_count, coarser_count + 1, &c, multires, err);
     if (status < 0) goto done;
     if (c.refused_component >= 0 && c.covered_component >= 0)
-        (void)pliant_error_set(&(*multires)->note, PLIANT_OK,
-                               "%d levels, as many as all %d components have: %.300s, where another "
-                               "component could be coarser",
-                               coarser_count + 1, c.component_count, why.text);
+        (void)pliant_error_set(
+            &(*multires)->note, PLIANT_OK,
+            "%d levels, as many as all %d components have: %.300s, where another "
+            "component could be coarser",
+            coarser_count + 1, c.component_count, why.text);
 done:
     for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) release_level(&levels[l]);
     release_cover(&c);

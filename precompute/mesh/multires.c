@@ -9,7 +9,8 @@ pliant_status pliant_multires_create(int32_t vertex_count, int32_t face_count, i
                                      pliant_multires **multires, pliant_error *err)
 {
     if (level_count < 1 || level_count > PLIANT_LEVEL_LIMIT + 1)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "levels above the base: expected 0..%d, found %d",
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "levels above the base: expected 0..%d, found %d",
                                 PLIANT_LEVEL_LIMIT, level_count - 1);
     // Each level has four faces for one, and a vertex more for each of the 3/2 edges per face.
     int64_t faces = face_count, vertices = vertex_count;
@@ -18,11 +19,11 @@ pliant_status pliant_multires_create(int32_t vertex_count, int32_t face_count, i
         vertices += faces / 2 * 3;
         faces *= 4;
         if (faces > INT32_MAX)
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "%d levels above %d base faces: level %d has %lld faces and %lld "
-                                    "vertices, expected at most %d",
-                                    level_count - 1, face_count, l, (long long)faces,
-                                    (long long)vertices, INT32_MAX);
+            return pliant_error_set(
+                err, PLIANT_ERR_ARGUMENT,
+                "%d levels above %d base faces: level %d has %lld faces and %lld "
+                "vertices, expected at most %d",
+                level_count - 1, face_count, l, (long long)faces, (long long)vertices, INT32_MAX);
         counts[l] = (int32_t)vertices;
     }
     pliant_multires *m = calloc(1, sizeof *m);

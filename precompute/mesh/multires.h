@@ -5,16 +5,16 @@
 #include "pliant/mesh.h"
 
 typedef struct pliant_multires {
-    pliant_mesh *mesh;        // finest level; vertices coarse to fine, faces in hierarchy.h's child order
-    int32_t level_count;      // L + 1
+    pliant_mesh *mesh;  // finest level; vertices coarse to fine, faces in hierarchy.h's child order
+    int32_t level_count;                           // L + 1
     int32_t vertex_count[PLIANT_LEVEL_LIMIT + 1];  // |K(l)|
-    int32_t *parents;         // shape [n - vertex_count[0]][2], ascending in each row
-    int32_t *source_index;    // shape [n]: vertex of the input mesh, or -1 where subdivision made it
-    pliant_error note;        // one line that the user should see, or an empty text
+    int32_t *parents;       // shape [n - vertex_count[0]][2], ascending in each row
+    int32_t *source_index;  // shape [n]: vertex of the input mesh, or -1 where subdivision made it
+    pliant_error note;      // one line that the user should see, or an empty text
 } pliant_multires;
 
-// Room for the levels of a closed mesh of `vertex_count` vertices and `face_count` faces on level 0:
-// counts filled in, the rest unset. Refuses, with figures, counts that int32_t does not hold.
+// Room for the levels of a closed mesh of `vertex_count` vertices and `face_count` faces on level
+// 0: counts filled in, the rest unset. Refuses, with figures, counts that int32_t does not hold.
 PLIANT_UNUSED_RESULT pliant_status pliant_multires_create(int32_t vertex_count, int32_t face_count,
                                                           int32_t level_count,
                                                           pliant_multires **multires,
@@ -22,7 +22,7 @@ PLIANT_UNUSED_RESULT pliant_status pliant_multires_create(int32_t vertex_count, 
 void pliant_multires_destroy(pliant_multires *multires);  // NULL is fine
 
 typedef enum pliant_subdivision_scheme {
-    PLIANT_SUBDIVIDE_LOOP,       // approximates: smooths base vertices too (plain steps, no limit positions)
+    PLIANT_SUBDIVIDE_LOOP,       // smooths base vertices too (plain steps, not limit positions)
     PLIANT_SUBDIVIDE_BUTTERFLY,  // interpolates: the modified butterfly
     PLIANT_SUBDIVIDE_MIDPOINT,   // keeps the surface: splits faces flat
 } pliant_subdivision_scheme;
@@ -30,7 +30,8 @@ typedef enum pliant_subdivision_scheme {
 // Subdivide a closed manifold mesh `levels` times (0: only the order of the arrays). Base vertices
 // keep their numbers, whatever their positions become (Loop smooths them), and base faces theirs.
 // The odd vertices of a level are numbered as they first appear on the sides of its faces in order.
-PLIANT_UNUSED_RESULT pliant_status pliant_multires_subdivide(const pliant_mesh *base, int32_t levels,
+PLIANT_UNUSED_RESULT pliant_status pliant_multires_subdivide(const pliant_mesh *base,
+                                                             int32_t levels,
                                                              pliant_subdivision_scheme scheme,
                                                              pliant_multires **multires,
                                                              pliant_error *err);

@@ -1,10 +1,10 @@
 // subdivision.c: refine a closed triangle mesh by Loop, butterfly or midpoint steps.
 //
-// This follows: C. Loop, Smooth subdivision surfaces based on triangles, master's thesis, University
-// of Utah, 1987; D. Zorin, P. Schroeder, W. Sweldens, Interpolating subdivision for meshes with
-// arbitrary topology, SIGGRAPH 1996 (tension w = 0: the 8-point stencil where both ends are
-// regular). We weigh a butterfly ring through its first two Fourier modes, so that a vertex of any
-// valence costs time linear in it.
+// This follows: C. Loop, Smooth subdivision surfaces based on triangles, master's thesis,
+// University of Utah, 1987; D. Zorin, P. Schroeder, W. Sweldens, Interpolating subdivision for
+// meshes with arbitrary topology, SIGGRAPH 1996 (tension w = 0: the 8-point stencil where both ends
+// are regular). We weigh a butterfly ring through its first two Fourier modes, so that a vertex of
+// any valence costs time linear in it.
 #include "mesh/multires.h"
 
 #include "pliant/error.h"
@@ -57,15 +57,16 @@ static void split_faces(step *s)
     }
 }
 
-// Replace the twins by those of the children. Half-edge k of face f is cut into side 0 of child k and
-// side 2 of child k+1; side 1 of child k faces side k-1 of the middle child.
+// Replace the twins by those of the children. Half-edge k of face f is cut into side 0 of child k
+// and side 2 of child k+1; side 1 of child k faces side k-1 of the middle child.
 static void split_twins(step *s)
 {
     for (int32_t f = s->face_count - 1; f >= 0; f--) {
         const int32_t across[3] = {s->twin[3 * f], s->twin[3 * f + 1], s->twin[3 * f + 2]};
         int32_t *child = s->twin + 12 * (size_t)f;
         for (int32_t k = 0; k < 3; k++) {
-            const int32_t g = across[k] / 3, j = across[k] % 3, next = (k + 1) % 3, last = (k + 2) % 3;
+            const int32_t g = across[k] / 3, j = across[k] % 3, next = (k + 1) % 3,
+                          last = (k + 2) % 3;
             child[3 * k] = 3 * (4 * g + (j + 1) % 3) + 2;
             child[3 * next + 2] = 3 * (4 * g + j);
             child[3 * k + 1] = 3 * (4 * f + 3) + last;
@@ -146,7 +147,8 @@ static int32_t turn(const step *s, int32_t h)
 // from the edge's other end.
 static void add_small_ring(step *s, int32_t first, int32_t valence)
 {
-    static const double weights[2][4] = {{5.0 / 12, -1.0 / 12, -1.0 / 12, 0}, {3.0 / 8, 0, -1.0 / 8, 0}};
+    static const double weights[2][4] = {{5.0 / 12, -1.0 / 12, -1.0 / 12, 0},
+                                         {3.0 / 8, 0, -1.0 / 8, 0}};
     int32_t h = first;
     for (int32_t i = 0; i < valence; i++, h = turn(s, h)) {
         double *x = s->vertices + 3 * (size_t)s->odd[h];
@@ -156,8 +158,8 @@ static void add_small_ring(step *s, int32_t first, int32_t valence)
     }
 }
 
-// The ring of an extraordinary vertex of valence K >= 5: 3/4 of the vertex and, of neighbour j counted
-// from the edge's other end i,
+// The ring of an extraordinary vertex of valence K >= 5: 3/4 of the vertex and, of neighbour j
+// counted from the edge's other end i,
 //   s_(j-i) = (1/4 + cos(t (j-i)) + cos(2 t (j-i)) / 2) / K,  t = 2 pi / K.
 // The cosines of differences split into sums that all edges share.
 static void add_ring(step *s, int32_t first, int32_t valence)
@@ -196,10 +198,8 @@ static void place_butterfly(step *s)
     visit_neighbours(s, NULL);
     for (int32_t h = 0; h < 3 * s->face_count; h++) {
         if (h > s->twin[h]) continue;
-        if (s->count[s->faces[h]] == 6 && s->count[s->faces[s->twin[h]]] == 6)
-            place_regular(s, h);
-        else
-            memset(s->vertices + 3 * (size_t)s->odd[h], 0, 3 * sizeof(double));
+        if (s->count[s->faces[h]] == 6 && s->count[s->faces[s->twin[h]]] == 6) place_regular(s, h);
+        else memset(s->vertices + 3 * (size_t)s->odd[h], 0, 3 * sizeof(double));
     }
     for (int32_t h = 0; h < 3 * s->face_count; h++) {
         // Each vertex once, from the first of its half-edges: its valence then turns negative.
@@ -209,7 +209,8 @@ static void place_butterfly(step *s)
         s->count[v] = -valence;
     }
     for (int32_t h = 0; h < 3 * s->face_count; h++) {
-        if (h > s->twin[h] || s->count[s->faces[h]] > 0 || s->count[s->faces[s->twin[h]]] > 0) continue;
+        if (h > s->twin[h] || s->count[s->faces[h]] > 0 || s->count[s->faces[s->twin[h]]] > 0)
+            continue;
         double *x = s->vertices + 3 * (size_t)s->odd[h];
         for (int c = 0; c < 3; c++) x[c] /= 2;
     }
@@ -221,9 +222,15 @@ static void refine(step *s, pliant_subdivision_scheme scheme)
 {
     number_odd(s);
     switch (scheme) {
-    case PLIANT_SUBDIVIDE_LOOP: place_loop(s); break;
-    case PLIANT_SUBDIVIDE_BUTTERFLY: place_butterfly(s); break;
-    case PLIANT_SUBDIVIDE_MIDPOINT: place_midpoints(s); break;
+    case PLIANT_SUBDIVIDE_LOOP:
+        place_loop(s);
+        break;
+    case PLIANT_SUBDIVIDE_BUTTERFLY:
+        place_butterfly(s);
+        break;
+    case PLIANT_SUBDIVIDE_MIDPOINT:
+        place_midpoints(s);
+        break;
     }
     split_faces(s);
     s->parents += s->face_count / 2 * 3 * (size_t)2;
@@ -236,8 +243,8 @@ static pliant_status match_base(const pliant_mesh *base, int32_t **twin, pliant_
     *twin = malloc(3 * (size_t)(base->face_count > 0 ? base->face_count : 1) * sizeof **twin);
     if (!*twin)
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d faces", base->face_count);
-    pliant_status status = pliant_halfedge_match(base->vertex_count, base->face_count, base->faces,
-                                                 *twin, &detail);
+    pliant_status status =
+        pliant_halfedge_match(base->vertex_count, base->face_count, base->faces, *twin, &detail);
     if (status < 0) return pliant_error_set(err, status, "base mesh: %.480s", detail.text);
     return PLIANT_OK;
 }
@@ -250,11 +257,12 @@ pliant_status pliant_multires_subdivide(const pliant_mesh *base, int32_t levels,
     double *sum = NULL;
     pliant_multires *m = NULL;
     if (levels < 0 || levels > PLIANT_LEVEL_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "levels to subdivide: expected 0..%d, found %d",
-                                PLIANT_LEVEL_LIMIT, levels);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "levels to subdivide: expected 0..%d, found %d", PLIANT_LEVEL_LIMIT,
+                                levels);
     if (scheme < PLIANT_SUBDIVIDE_LOOP || scheme > PLIANT_SUBDIVIDE_MIDPOINT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "subdivision scheme: expected 0..2, found %d",
-                                (int)scheme);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "subdivision scheme: expected 0..2, found %d", (int)scheme);
     pliant_status status = match_base(base, &twin, err);
     if (status < 0) goto done;
     status = pliant_multires_create(base->vertex_count, base->face_count, levels + 1, &m, err);
@@ -278,9 +286,15 @@ pliant_status pliant_multires_subdivide(const pliant_mesh *base, int32_t levels,
                                       m->mesh->face_count);
             goto done;
         }
-        step s = {.vertex_count = base->vertex_count, .face_count = base->face_count,
-                  .vertices = m->mesh->vertices, .faces = m->mesh->faces, .parents = m->parents,
-                  .twin = twin, .odd = odd, .sum = sum, .count = count};
+        step s = {.vertex_count = base->vertex_count,
+                  .face_count = base->face_count,
+                  .vertices = m->mesh->vertices,
+                  .faces = m->mesh->faces,
+                  .parents = m->parents,
+                  .twin = twin,
+                  .odd = odd,
+                  .sum = sum,
+                  .count = count};
         for (int32_t l = 0; l < levels; l++, s.face_count *= 4) {
             refine(&s, scheme);
             if (l + 1 < levels) split_twins(&s);

@@ -14,14 +14,22 @@
 static check_surface surface(int which, int32_t levels)
 {
     switch (which) {
-    case 0: return check_refine(check_tetrahedron(), levels);
-    case 1: return check_refine(check_octahedron(), levels);
-    case 2: return check_sphere(levels);
-    case 3: return check_refine(check_cube(), levels);
-    case 4: return check_refine(check_torus(3, 5), levels);
-    case 5: return check_refine(check_block(2), levels);
-    case 6: return check_refine(check_beside(check_octahedron(), check_torus(4, 3)), levels);
-    default: return check_refine(check_block(0), levels);
+    case 0:
+        return check_refine(check_tetrahedron(), levels);
+    case 1:
+        return check_refine(check_octahedron(), levels);
+    case 2:
+        return check_sphere(levels);
+    case 3:
+        return check_refine(check_cube(), levels);
+    case 4:
+        return check_refine(check_torus(3, 5), levels);
+    case 5:
+        return check_refine(check_block(2), levels);
+    case 6:
+        return check_refine(check_beside(check_octahedron(), check_torus(4, 3)), levels);
+    default:
+        return check_refine(check_block(0), levels);
     }
 }
 
@@ -35,10 +43,14 @@ static void the_generators_of_the_tests_enclose_what_they_say(void **state)
         int euler;
         double volume_min, volume_max;
     } cases[] = {
-        {check_tetrahedron(), 2, 2.666, 2.667}, {check_octahedron(), 2, 1.333, 1.334},
-        {check_icosahedron(), 2, 2.536, 2.537}, {check_cube(), 2, 8, 8},
-        {check_torus(9, 12), 0, 1.2, 1.58},     {check_block(0), 2, 3, 3},
-        {check_block(1), 0, 8, 8},              {check_block(2), -2, 13, 13},
+        {check_tetrahedron(), 2, 2.666, 2.667},
+        {check_octahedron(), 2, 1.333, 1.334},
+        {check_icosahedron(), 2, 2.536, 2.537},
+        {check_cube(), 2, 8, 8},
+        {check_torus(9, 12), 0, 1.2, 1.58},
+        {check_block(0), 2, 3, 3},
+        {check_block(1), 0, 8, 8},
+        {check_block(2), -2, 13, 13},
         {check_beside(check_cube(), check_octahedron()), 4, 9.333, 9.334},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -156,7 +168,8 @@ static void parents_may_come_in_either_order_and_none_are_needed_for_one_level(v
 
     pliant_error err;
     const int32_t count = s.mesh->vertex_count;
-    check_ok(pliant_hierarchy_create(1, &count, s.mesh->face_count, s.mesh->faces, NULL, &h, &err), &err);
+    check_ok(pliant_hierarchy_create(1, &count, s.mesh->face_count, s.mesh->faces, NULL, &h, &err),
+             &err);
     assert_int_equal(h->level_count, 1);
     pliant_hierarchy_destroy(h);
     check_surface_destroy(&s);
@@ -191,8 +204,8 @@ static void refuse(const claims *c, const char *text)
     assert_non_null(parents);
     memcpy(faces, c->faces, face_bytes);
     memcpy(parents, c->parents, parent_bytes);
-    const pliant_status status = pliant_hierarchy_create(c->level_count, c->vertex_count, c->face_count,
-                                                         faces, parents, &h, &err);
+    const pliant_status status = pliant_hierarchy_create(c->level_count, c->vertex_count,
+                                                         c->face_count, faces, parents, &h, &err);
     free(parents);
     free(faces);
     if (status != PLIANT_ERR_FORMAT || h || !strstr(err.text, text)) {
@@ -228,7 +241,8 @@ static void counts_that_cannot_be_are_refused_before_anything_is_read(void **sta
         for (size_t i = 0; i < 6; i++) {
             claims c = sound;
             c.vertex_count[l] = vertex_counts[i];
-            refuse(&c, l == 1 ? "vertices of level 1: expected 18" : "vertices of level 2: expected 66");
+            refuse(&c, l == 1 ? "vertices of level 1: expected 18"
+                              : "vertices of level 2: expected 66");
         }
     claims c = sound;  // far more than the arrays hold, each count alone plausible
     c.face_count = 1 << 30;
@@ -289,7 +303,8 @@ static void faces_out_of_child_order_are_refused(void **state)
         const int32_t first = c.faces[3 * f];
         memmove(c.faces + 3 * f, c.faces + 3 * f + 1, 2 * sizeof(int32_t));
         c.faces[3 * f + 2] = first;
-        refuse(&c, f % 4 == 3 ? "beside the middle face" : "of level 2: expected a first corner of level 1");
+        refuse(&c, f % 4 == 3 ? "beside the middle face"
+                              : "of level 2: expected a first corner of level 1");
     }
     for (int32_t f = 3; f < 128; f += 4) {
         claims c = sound_claims();  // a coarse vertex for a midpoint
@@ -321,7 +336,8 @@ static void a_sheet_turned_over_is_refused(void **state)
 }
 
 // A base mesh alone, with its faces given.
-static void refuse_base(int32_t vertex_count, int32_t face_count, const int32_t *faces, const char *text)
+static void refuse_base(int32_t vertex_count, int32_t face_count, const int32_t *faces,
+                        const char *text)
 {
     claims c = {.level_count = 1, .vertex_count = {vertex_count}, .face_count = face_count};
     memcpy(c.faces, faces, (size_t)face_count * 3 * sizeof(int32_t));
@@ -353,7 +369,8 @@ static void base_meshes_that_bound_no_solid_are_refused(void **state)
     // Two octahedra that share a vertex: vertex 6 of the second is vertex 0 of the first.
     memcpy(f, octahedron->faces, bytes);
     for (int i = 0; i < 24; i++) f[24 + i] = f[i] == 0 ? 0 : f[i] + 5;
-    refuse_base(11, 16, f, "level 0: vertex 0: expected one ring of 8 faces around it, found a ring of 4");
+    refuse_base(11, 16, f,
+                "level 0: vertex 0: expected one ring of 8 faces around it, found a ring of 4");
 
     // Two that share an edge, and so have four faces on it.
     memcpy(f, octahedron->faces, bytes);
@@ -383,14 +400,13 @@ static void random_damage_is_refused_or_harmless(void **state)
         claims c = sound_claims();
         for (int32_t hits = 1 + check_random_index(&random, 3); hits > 0; hits--) {
             const int32_t value = check_random_index(&random, 70) - 2;
-            if (check_random_index(&random, 2))
-                c.faces[check_random_index(&random, 384)] = value;
-            else
-                c.parents[check_random_index(&random, 120)] = value;
+            if (check_random_index(&random, 2)) c.faces[check_random_index(&random, 384)] = value;
+            else c.parents[check_random_index(&random, 120)] = value;
         }
         pliant_hierarchy *h = NULL;
         pliant_error err;
-        if (pliant_hierarchy_create(3, c.vertex_count, 128, c.faces, c.parents, &h, &err) == PLIANT_OK)
+        if (pliant_hierarchy_create(3, c.vertex_count, 128, c.faces, c.parents, &h, &err) ==
+            PLIANT_OK)
             accepted++;
         pliant_hierarchy_destroy(h);
     }

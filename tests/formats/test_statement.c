@@ -2,7 +2,7 @@
 #include "check.h"
 
 #include "pliant/script.h"
-#include "utf8.h"
+#include "pliant/utf8.h"
 
 #include <stdio.h>
 #include <stdlib.h>

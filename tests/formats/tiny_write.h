@@ -9,13 +9,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// A path in this process's own folder under TMPDIR or /tmp; static, good until the fourth next call.
+// A path in this process's own folder under TMPDIR or /tmp; static, good until the 16th next call.
 static inline const char *scratch(const char *name)
 {
-    static char paths[4][512];
+    static char paths[16][512];
     static int next;
     const char *folder = getenv("TMPDIR");
-    char *path = paths[next++ % 4];
+    char *path = paths[next++ % 16];
     snprintf(path, sizeof paths[0], "%s/pliant-test-%d", folder ? folder : "/tmp", (int)getpid());
     mkdir(path, 0777);
     const size_t length = strlen(path);
@@ -67,11 +67,12 @@ static inline pliant_status tiny_write(const tiny_file *file, const char *path, 
     return status;
 }
 
-// The whole file; to be freed. NULL when it cannot be read.
+// The whole file; to be freed.
 static inline unsigned char *load(const char *path, size_t *size)
 {
     FILE *file = fopen(path, "rb");
-    if (!file) return NULL;
+    *size = 0;
+    assert_non_null(file);
     fseek(file, 0, SEEK_END);
     *size = (size_t)ftell(file);
     rewind(file);

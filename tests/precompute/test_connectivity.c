@@ -44,7 +44,8 @@ static void refuse(const pliant_mesh *mesh, const char *text)
     const int advised = status != PLIANT_ERR_MISSING || strstr(err.text, advice) != NULL;
     if (status >= 0 || m || !advised || !strstr(err.text, text)) {
         pliant_multires_destroy(m);
-        fail_msg("%s: \"%s\", expected a refusal with \"%s\"", pliant_status_name(status), err.text, text);
+        fail_msg("%s: \"%s\", expected a refusal with \"%s\"", pliant_status_name(status), err.text,
+                 text);
     }
 }
 
@@ -87,8 +88,10 @@ static triangle *canonical(int32_t face_count, const int32_t *faces, const int32
     return t;
 }
 
-// Two meshes with levels are the same on every level, when vertex v of `a` is vertex name[v] of `b`.
-static void check_same_levels(const pliant_multires *a, const pliant_multires *b, const int32_t *name)
+// Two meshes with levels are the same on every level, when vertex v of `a` is vertex name[v] of
+// `b`.
+static void check_same_levels(const pliant_multires *a, const pliant_multires *b,
+                              const int32_t *name)
 {
     assert_int_equal(a->level_count, b->level_count);
     assert_memory_equal(a->vertex_count, b->vertex_count, sizeof a->vertex_count);
@@ -96,7 +99,8 @@ static void check_same_levels(const pliant_multires *a, const pliant_multires *b
     assert_non_null(identity);
     for (int32_t v = 0; v < b->mesh->vertex_count; v++) identity[v] = v;
     for (int32_t v = 0; v < a->mesh->vertex_count; v++)
-        assert_memory_equal(a->mesh->vertices + 3 * v, b->mesh->vertices + 3 * name[v], 3 * sizeof(double));
+        assert_memory_equal(a->mesh->vertices + 3 * v, b->mesh->vertices + 3 * name[v],
+                            3 * sizeof(double));
     pliant_hierarchy *ha = hierarchy_of(a), *hb = hierarchy_of(b);
     for (int32_t l = 0; l < a->level_count; l++) {
         assert_int_equal(ha->face_count[l], hb->face_count[l]);
@@ -137,7 +141,8 @@ static void check_order(const pliant_multires *m, const pliant_mesh *input)
         for (int32_t i = f; i < f + family; i++) {
             const int32_t *v = m->mesh->faces + 3 * i, *s = m->source_index;
             const triangle t = begin_lowest(s[v[0]], s[v[1]], s[v[2]]);
-            const numbered *same = bsearch(&t, sorted, (size_t)input->face_count, sizeof *sorted, by_vertices);
+            const numbered *same =
+                bsearch(&t, sorted, (size_t)input->face_count, sizeof *sorted, by_vertices);
             assert_non_null(same);
             if (same->face < lowest) lowest = same->face;
         }
@@ -161,9 +166,11 @@ static void what_subdivision_made_comes_back_as_it_was(void **state)
                                              : check_block(2);
             pliant_multires *made = subdivide(base, levels), *found = detect(made->mesh);
             assert_int_equal(found->level_count, levels + 1);
-            assert_memory_equal(found->vertex_count, made->vertex_count, sizeof found->vertex_count);
+            assert_memory_equal(found->vertex_count, made->vertex_count,
+                                sizeof found->vertex_count);
             const size_t n = (size_t)made->mesh->vertex_count, n0 = (size_t)made->vertex_count[0];
-            assert_memory_equal(found->mesh->vertices, made->mesh->vertices, n * 3 * sizeof(double));
+            assert_memory_equal(found->mesh->vertices, made->mesh->vertices,
+                                n * 3 * sizeof(double));
             assert_memory_equal(found->mesh->faces, made->mesh->faces,
                                 (size_t)made->mesh->face_count * 3 * sizeof(int32_t));
             assert_memory_equal(found->parents, made->parents, (n - n0) * 2 * sizeof(int32_t));
@@ -204,14 +211,16 @@ static void random_surfaces_in_random_order_have_their_levels_found(void **state
         pliant_error err;
         check_ok(pliant_mesh_create(n, made->mesh->face_count, &shuffled, &err), &err);
         memcpy(shuffled->vertices, made->mesh->vertices, (size_t)n * 3 * sizeof(double));
-        memcpy(shuffled->faces, made->mesh->faces, (size_t)shuffled->face_count * 3 * sizeof(int32_t));
+        memcpy(shuffled->faces, made->mesh->faces,
+               (size_t)shuffled->face_count * 3 * sizeof(int32_t));
         int32_t *to = malloc((size_t)n * sizeof *to), *from = malloc((size_t)n * sizeof *from);
         assert_non_null(to);
         assert_non_null(from);
         check_shuffle(shuffled, &random, to);
         pliant_multires *found = detect(shuffled);
         check_order(found, shuffled);
-        // Vertex v found is source_index[v] of the shuffled mesh, which came from ... of the made one.
+        // Vertex v found is source_index[v] of the shuffled mesh, which came from ... of the made
+        // one.
         int32_t *name = malloc((size_t)n * sizeof *name);
         assert_non_null(name);
         for (int32_t v = 0; v < n; v++) from[to[v]] = v;
@@ -235,7 +244,8 @@ static void tori_of_regular_vertices_are_as_deep_as_their_grid_halves(void **sta
     // even and leave at least three vertices each way, below which the mesh has double edges.
     const struct {
         int32_t rows, columns, levels;
-    } cases[] = {{24, 12, 3}, {12, 24, 3}, {6, 6, 2}, {48, 40, 4}, {16, 16, 3}, {6, 10, 2}, {20, 12, 3}};
+    } cases[] = {{24, 12, 3}, {12, 24, 3}, {6, 6, 2},  {48, 40, 4},
+                 {16, 16, 3}, {6, 10, 2},  {20, 12, 3}};
     check_random random = check_random_seed(22);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         for (int run = 0; run < 5; run++) {
@@ -298,8 +308,8 @@ static void components_are_as_deep_as_the_shallowest_and_the_note_says_so(void *
 static void meshes_without_levels_are_refused_with_the_reason_and_the_way_out(void **state)
 {
     (void)state;
-    pliant_mesh *meshes[] = {check_tetrahedron(), check_octahedron(), check_icosahedron(), check_cube(),
-                             check_block(0), check_block(2)};
+    pliant_mesh *meshes[] = {check_tetrahedron(), check_octahedron(), check_icosahedron(),
+                             check_cube(),        check_block(0),     check_block(2)};
     for (size_t i = 0; i < sizeof meshes / sizeof *meshes; i++) {
         refuse(meshes[i], "no subdivision connectivity: vertex");
         pliant_mesh_destroy(meshes[i]);
@@ -382,7 +392,8 @@ static void the_evaluation_meshes_have_the_levels_of_their_manifest(void **state
         int32_t count = 0;
         while (count < 7 && cases[i].levels[count]) count++;
         assert_int_equal(m->level_count, count);
-        for (int32_t l = 0; l < count; l++) assert_int_equal(m->vertex_count[l], cases[i].levels[l]);
+        for (int32_t l = 0; l < count; l++)
+            assert_int_equal(m->vertex_count[l], cases[i].levels[l]);
         check_order(m, mesh);
         // Those in order keep their vertex numbers.
         for (int32_t v = 0; v < mesh->vertex_count && !strstr(cases[i].name, "shuffled"); v++)
@@ -409,7 +420,8 @@ static void shuffled_files_lead_back_to_the_ordered_ones_and_to_their_bases(void
                               {"bunny_L4_shuffled", "bunny_L4", "bunny_base"},
                               {"dragon_L3_shuffled", "dragon_L3", "dragon_base"}};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        pliant_mesh *shuffled = load(names[i][0]), *ordered = load(names[i][1]), *base = load(names[i][2]);
+        pliant_mesh *shuffled = load(names[i][0]), *ordered = load(names[i][1]),
+                    *base = load(names[i][2]);
         if (!shuffled || !ordered || !base) skip();
         pliant_multires *a = detect(shuffled), *b = detect(ordered);
         const int32_t n = shuffled->vertex_count, n0 = base->vertex_count;
@@ -417,8 +429,7 @@ static void shuffled_files_lead_back_to_the_ordered_ones_and_to_their_bases(void
         int32_t *identity = malloc((size_t)n0 * sizeof *identity);
         assert_non_null(name);
         assert_non_null(identity);
-        for (int32_t v = 0; v < n; v++)
-            name[v] = vertex_at(b->mesh, n, a->mesh->vertices + 3 * v);
+        for (int32_t v = 0; v < n; v++) name[v] = vertex_at(b->mesh, n, a->mesh->vertices + 3 * v);
         check_same_levels(a, b, name);
 
         // The coarsest level is the base file.

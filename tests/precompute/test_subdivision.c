@@ -11,7 +11,8 @@
 static const pliant_subdivision_scheme SCHEMES[3] = {
     PLIANT_SUBDIVIDE_LOOP, PLIANT_SUBDIVIDE_BUTTERFLY, PLIANT_SUBDIVIDE_MIDPOINT};
 
-static pliant_multires *subdivide(const pliant_mesh *base, int32_t levels, pliant_subdivision_scheme scheme)
+static pliant_multires *subdivide(const pliant_mesh *base, int32_t levels,
+                                  pliant_subdivision_scheme scheme)
 {
     pliant_multires *m = NULL;
     pliant_error err;
@@ -34,14 +35,22 @@ static pliant_hierarchy *hierarchy_of(const pliant_multires *m)
 static pliant_mesh *base_mesh(int which)
 {
     switch (which) {
-    case 0: return check_tetrahedron();
-    case 1: return check_octahedron();
-    case 2: return check_icosahedron();
-    case 3: return check_cube();
-    case 4: return check_torus(4, 5);
-    case 5: return check_block(1);
-    case 6: return check_block(2);
-    default: return check_beside(check_cube(), check_torus(3, 6));
+    case 0:
+        return check_tetrahedron();
+    case 1:
+        return check_octahedron();
+    case 2:
+        return check_icosahedron();
+    case 3:
+        return check_cube();
+    case 4:
+        return check_torus(4, 5);
+    case 5:
+        return check_block(1);
+    case 6:
+        return check_block(2);
+    default:
+        return check_beside(check_cube(), check_torus(3, 6));
     }
 }
 
@@ -89,7 +98,8 @@ static void all_schemes_and_valences_make_sound_hierarchies(void **state)
             pliant_mesh *base = random_base(which, &random);
             pliant_multires *m = subdivide(base, 3, SCHEMES[scheme]);
             pliant_hierarchy *h = hierarchy_of(m);
-            assert_memory_equal(h->faces[0], base->faces, (size_t)base->face_count * 3 * sizeof(int32_t));
+            assert_memory_equal(h->faces[0], base->faces,
+                                (size_t)base->face_count * 3 * sizeof(int32_t));
             for (int32_t v = 0; v < m->mesh->vertex_count; v++) {
                 assert_int_equal(m->source_index[v], v < base->vertex_count ? v : -1);
                 for (int c = 0; c < 3; c++) assert_true(isfinite(m->mesh->vertices[3 * v + c]));
@@ -127,7 +137,8 @@ static int32_t between(const pliant_multires *m, int32_t a, int32_t b)
     return -1;
 }
 
-// Compare with a file of the same base mesh that others subdivided: vertices pair up by their parents.
+// Compare with a file of the same base mesh that others subdivided: vertices pair up by their
+// parents.
 static void compare_steps(const char *base_path, const char *path, int32_t levels)
 {
     pliant_mesh *base = check_load_obj(base_path), *file = check_load_obj(path);
@@ -187,10 +198,12 @@ static void every_scheme_commutes_with_affine_maps(void **state)
             }
             pliant_multires *after = subdivide(base, 2, SCHEMES[scheme]);
             for (int32_t v = 0; v < before->mesh->vertex_count; v++) {
-                const double *x = before->mesh->vertices + 3 * v, *y = after->mesh->vertices + 3 * v;
+                const double *x = before->mesh->vertices + 3 * v,
+                             *y = after->mesh->vertices + 3 * v;
                 // Values up to about 20 through some tens of roundings.
                 for (int r = 0; r < 3; r++)
-                    check_near(y[r], map[r][0] * x[0] + map[r][1] * x[1] + map[r][2] * x[2] + map[r][3],
+                    check_near(y[r],
+                               map[r][0] * x[0] + map[r][1] * x[1] + map[r][2] * x[2] + map[r][3],
                                1e-13);
             }
             pliant_multires_destroy(after);
@@ -222,16 +235,17 @@ static double polynomial(double i, double j, int degree)
 {
     double p = 0.3 + 0.5 * i - 0.7 * j;
     if (degree >= 2) p += 0.11 * i * i - 0.05 * i * j + 0.07 * j * j;
-    if (degree >= 3) p += 0.013 * i * i * i - 0.02 * i * i * j + 0.017 * i * j * j - 0.011 * j * j * j;
+    if (degree >= 3)
+        p += 0.013 * i * i * i - 0.02 * i * i * j + 0.017 * i * j * j - 0.011 * j * j * j;
     return p;
 }
 
 static void regular_patches_reproduce_the_polynomials_that_theory_says(void **state)
 {
     (void)state;
-    // The torus cut open is the regular lattice: its vertex (i, j) gets the position (i, j, p(i, j)).
-    // The 8-point butterfly reproduces cubic p (Dyn, Levin and Gregory 1990), odd Loop vertices and
-    // midpoints linear p only. Stencils of edges inside [2, 9]^2 do not reach the cut.
+    // The torus cut open is the regular lattice: its vertex (i, j) gets the position (i, j, p(i,
+    // j)). The 8-point butterfly reproduces cubic p (Dyn, Levin and Gregory 1990), odd Loop
+    // vertices and midpoints linear p only. Stencils of edges inside [2, 9]^2 do not reach the cut.
     const int degree[3] = {1, 3, 1};
     for (int scheme = 0; scheme < 3; scheme++)
         for (int higher = 0; higher < 2; higher++) {
@@ -239,18 +253,20 @@ static void regular_patches_reproduce_the_polynomials_that_theory_says(void **st
             for (int32_t v = 0; v < 144; v++) {
                 const double i = v / 12, j = v % 12;
                 memcpy(base->vertices + 3 * v,
-                       (double[3]){i, j, polynomial(i, j, degree[scheme] + higher)}, 3 * sizeof(double));
+                       (double[3]){i, j, polynomial(i, j, degree[scheme] + higher)},
+                       3 * sizeof(double));
             }
             if (degree[scheme] + higher == 4)
-                for (int32_t v = 0; v < 144; v++) base->vertices[3 * v + 2] += 1e-3 * pow(v / 12, 4);
+                for (int32_t v = 0; v < 144; v++)
+                    base->vertices[3 * v + 2] += 1e-3 * pow(v / 12, 4);
             pliant_multires *m = subdivide(base, 1, SCHEMES[scheme]);
             double worst = 0;
             int found = 0;
             for (int32_t k = 0; k < m->mesh->vertex_count - 144; k++) {
                 const int32_t a = m->parents[2 * k], b = m->parents[2 * k + 1];
                 const double i = (a / 12 + b / 12) / 2.0, j = (a % 12 + b % 12) / 2.0;
-                if (fmin(a / 12, b / 12) < 2 || fmin(a % 12, b % 12) < 2 || fmax(a / 12, b / 12) > 9 ||
-                    fmax(a % 12, b % 12) > 9)
+                if (fmin(a / 12, b / 12) < 2 || fmin(a % 12, b % 12) < 2 ||
+                    fmax(a / 12, b / 12) > 9 || fmax(a % 12, b % 12) > 9)
                     continue;
                 const double *x = m->mesh->vertices + 3 * (144 + k);
                 check_near(x[0], i, 1e-13);
@@ -261,10 +277,8 @@ static void regular_patches_reproduce_the_polynomials_that_theory_says(void **st
                 found++;
             }
             assert_int_equal(found, 7 * 8 * 2 + 7 * 7);
-            if (higher)
-                check_at_least(worst, 1e-4);  // the next degree is not reproduced
-            else
-                check_at_most(worst, 1e-12);
+            if (higher) check_at_least(worst, 1e-4);  // the next degree is not reproduced
+            else check_at_most(worst, 1e-12);
             pliant_multires_destroy(m);
             pliant_mesh_destroy(base);
         }
@@ -324,8 +338,11 @@ static void butterfly_weighs_every_kind_of_edge_as_the_paper_does(void **state)
                 for (int c = 0; c < 3; c++) {
                     const double *y = base->vertices;
                     // Around a from b: opposite corners at 1 and 5, wings at 2 and 4.
-                    x[c] = (y[3 * a + c] + y[3 * b + c]) / 2 + (y[3 * ra[1] + c] + y[3 * ra[5] + c]) / 8 -
-                           (y[3 * ra[2] + c] + y[3 * ra[4] + c] + y[3 * rb[2] + c] + y[3 * rb[4] + c]) / 16;
+                    x[c] = (y[3 * a + c] + y[3 * b + c]) / 2 +
+                           (y[3 * ra[1] + c] + y[3 * ra[5] + c]) / 8 -
+                           (y[3 * ra[2] + c] + y[3 * ra[4] + c] + y[3 * rb[2] + c] +
+                            y[3 * rb[4] + c]) /
+                               16;
                 }
             for (int c = 0; c < 3; c++) check_near(m->mesh->vertices[3 * v + c], x[c], 1e-13);
         }
@@ -351,7 +368,8 @@ static void valences_of_thousands_take_no_longer_than_their_edges(void **state)
         base->vertices[3 * i] = cos(6.283185307179586 * i / AROUND);
         base->vertices[3 * i + 1] = sin(6.283185307179586 * i / AROUND);
         const int32_t next = (i + 1) % AROUND;
-        memcpy(base->faces + 6 * i, (int32_t[6]){i, next, AROUND, next, i, AROUND + 1}, 6 * sizeof(int32_t));
+        memcpy(base->faces + 6 * i, (int32_t[6]){i, next, AROUND, next, i, AROUND + 1},
+               6 * sizeof(int32_t));
     }
     for (int scheme = 0; scheme < 3; scheme++) {
         pliant_multires *m = subdivide(base, 2, SCHEMES[scheme]);

@@ -109,6 +109,7 @@ static void check_spoilt(float factor, pliant_status expected)
         for (int32_t k = 0; k < 5; k++)
             assert_memory_equal(&u[s->nodes[0][spoilt - 2 + k]], &down, sizeof down);
         assert_true(isfinite(pliant_solver_contact_force(solver).z));
+        print_message("force %g\n", (double)pliant_solver_contact_force(solver).z);
         assert_true(pliant_solver_contact_force(solver).z != 0);
     }
     // A patch without the spoilt column is sound.

@@ -39,7 +39,8 @@ pliant_mesh *check_tetrahedron(void)
 
 pliant_mesh *check_octahedron(void)
 {
-    static const double v[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+    static const double v[6][3] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                   {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
     static const int32_t f[8][3] = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                                     {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
     return make(6, v, 8, f);
@@ -62,8 +63,9 @@ pliant_mesh *check_cube(void)
 {
     static const double v[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
                                    {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
-    static const int32_t f[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
-                                     {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+    static const int32_t f[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6},
+                                     {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3},
+                                     {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
     return make(8, v, 12, f);
 }
 
@@ -97,7 +99,8 @@ static int block_has(int32_t genus, int32_t x, int32_t y, int32_t z)
 pliant_mesh *check_block(int32_t genus)
 {
     // The corners of unit cube side s, counterclockwise from outside; sides -x +x -y +y -z +z.
-    static const int8_t step[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
+    static const int8_t step[6][3] = {{-1, 0, 0}, {1, 0, 0},  {0, -1, 0},
+                                      {0, 1, 0},  {0, 0, -1}, {0, 0, 1}};
     static const int8_t corner[6][4][3] = {
         {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}}, {{1, 0, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}},
         {{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}}, {{0, 1, 0}, {0, 1, 1}, {1, 1, 1}, {1, 1, 0}},
@@ -130,8 +133,8 @@ pliant_mesh *check_block(int32_t genus)
                 memcpy(faces[face_count++], (int32_t[3]){q[0], q[1], q[2]}, sizeof *faces);
                 memcpy(faces[face_count++], (int32_t[3]){q[0], q[2], q[3]}, sizeof *faces);
             }
-    pliant_mesh *mesh = make(vertex_count, (const double(*)[3])vertices, face_count,
-                             (const int32_t(*)[3])faces);
+    pliant_mesh *mesh =
+        make(vertex_count, (const double(*)[3])vertices, face_count, (const int32_t(*)[3])faces);
     free(vertices);
     free(faces);
     free(number);
@@ -149,7 +152,8 @@ pliant_mesh *check_beside(pliant_mesh *first, pliant_mesh *second)
     for (int32_t i = 0; i < second->vertex_count; i++) left = fmin(left, second->vertices[3 * i]);
     for (int32_t i = 0; i < 3 * second->vertex_count; i++)
         mesh->vertices[3 * v + i] = second->vertices[i] + (i % 3 == 0 ? right - left + 0.5 : 0);
-    for (int32_t i = 0; i < 3 * second->face_count; i++) mesh->faces[3 * f + i] = second->faces[i] + v;
+    for (int32_t i = 0; i < 3 * second->face_count; i++)
+        mesh->faces[3 * f + i] = second->faces[i] + v;
     pliant_mesh_destroy(second);
     pliant_mesh_destroy(first);
     return mesh;
@@ -196,7 +200,8 @@ static int32_t number_edges(const pliant_mesh *mesh, int32_t *odd, int32_t *pare
     pliant_error err;
     const int32_t side_count = 3 * mesh->face_count;
     int32_t *twin = reserve((size_t)side_count * sizeof *twin);
-    check_ok(pliant_halfedge_match(mesh->vertex_count, mesh->face_count, mesh->faces, twin, &err), &err);
+    check_ok(pliant_halfedge_match(mesh->vertex_count, mesh->face_count, mesh->faces, twin, &err),
+             &err);
     int32_t next = 0;
     for (int32_t h = 0; h < side_count; h++) {
         if (twin[h] < h) {

@@ -1,7 +1,7 @@
 // surfaces.h: the small closed surfaces that tests share, and what they do to them.
 //
-// Every generator fails the test on lack of memory, so that nothing needs checking. Meshes are freed
-// by pliant_mesh_destroy, surfaces by check_surface_destroy. Faces look outwards.
+// Every generator fails the test on lack of memory, so that nothing needs checking. Meshes are
+// freed by pliant_mesh_destroy, surfaces by check_surface_destroy. Faces look outwards.
 //
 //     check_surface sphere = check_sphere(3);             // 642 vertices, levels 0..3
 //     pliant_hierarchy *h = check_hierarchy(&sphere);

@@ -17,6 +17,10 @@ extern void dgemm_(const char *ta, const char *tb, const int *m, const int *n, c
                    const double *alpha, const double *a, const int *lda, const double *b,
                    const int *ldb, const double *beta, double *c, const int *ldc);
 
+// OpenBLAS's own threads are invisible to ThreadSanitizer, and small test matrices gain nothing from
+// them. NULL with another BLAS.
+extern void openblas_set_num_threads(int count) __attribute__((weak));
+
 static void *take(size_t count, size_t size)
 {
     void *memory = calloc(count ? count : 1, size);
@@ -302,6 +306,7 @@ check_synthetic *check_synthetic_create(const check_synthetic_def *def)
 {
     check_synthetic *s = take(1, sizeof *s);
     pliant_error err = {""};
+    if (openblas_set_num_threads) openblas_set_num_threads(1);
     s->def = *def;
     s->density = 1;
     s->surface = check_sphere(def->levels);

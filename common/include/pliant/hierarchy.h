@@ -22,8 +22,10 @@
 //
 //     parents     ascending: parents[0] < parents[1]
 //     opposite    [0] in the triangle that runs from parents[0] to parents[1], [1] in the other
-//     wings       [0] across the edge (parents[0], opposite[0])   [1] across (parents[1], opposite[0])
-//                 [2] across the edge (parents[0], opposite[1])   [3] across (parents[1], opposite[1])
+//     wings       [0] across the edge of parents[0] and opposite[0]
+//                 [1] across the edge of parents[1] and opposite[0]
+//                 [2] across the edge of parents[0] and opposite[1]
+//                 [3] across the edge of parents[1] and opposite[1]
 //
 // On coarse meshes vertices may repeat, wings among themselves and with opposite.
 typedef struct pliant_stencil {
@@ -33,11 +35,12 @@ typedef struct pliant_stencil {
 } pliant_stencil;
 
 typedef struct pliant_hierarchy {
-    int32_t level_count;                             // L + 1
-    int32_t vertex_count[PLIANT_LEVEL_LIMIT + 1];    // |K(l)|
+    int32_t level_count;                           // L + 1
+    int32_t vertex_count[PLIANT_LEVEL_LIMIT + 1];  // |K(l)|
     int32_t face_count[PLIANT_LEVEL_LIMIT + 1];
-    const int32_t *faces[PLIANT_LEVEL_LIMIT + 1];    // faces[l] has shape [face_count[l]][3]; owned
-    const pliant_stencil *stencils;                  // [n - vertex_count[0]], of vertex v at v - vertex_count[0]; owned
+    const int32_t *faces[PLIANT_LEVEL_LIMIT + 1];  // faces[l] has shape [face_count[l]][3]; owned
+    // Of every odd vertex v at v - vertex_count[0]: shape [n - vertex_count[0]]; owned.
+    const pliant_stencil *stencils;
 } pliant_hierarchy;
 
 // Derive all levels from the finest faces and check every claim made (the arrays may come from an
@@ -47,12 +50,9 @@ typedef struct pliant_hierarchy {
 // order; may be NULL when level_count is 1); the caller has checked that they are that large. All
 // inputs are copied. Memory and time are linear in face_count. PLIANT_ERR_FORMAT names the level,
 // the face or vertex, what was expected and what was found.
-PLIANT_UNUSED_RESULT pliant_status pliant_hierarchy_create(int32_t level_count,
-                                                           const int32_t *vertex_count,
-                                                           int32_t face_count, const int32_t *faces,
-                                                           const int32_t *parents,
-                                                           pliant_hierarchy **hierarchy,
-                                                           pliant_error *err);
+PLIANT_UNUSED_RESULT pliant_status pliant_hierarchy_create(
+    int32_t level_count, const int32_t *vertex_count, int32_t face_count, const int32_t *faces,
+    const int32_t *parents, pliant_hierarchy **hierarchy, pliant_error *err);
 void pliant_hierarchy_destroy(pliant_hierarchy *hierarchy);  // NULL is fine
 
 // The level on which a vertex first appears.

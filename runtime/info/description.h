@@ -1,0 +1,25 @@
+// description.h: what is in a file, as text for people or as JSON.
+#pragma once
+
+#include "contents.h"
+
+#include <stdio.h>
+
+// Both write to `stream`; its error state tells whether that worked.
+void pliant_description_print(const pliant_contents *contents, FILE *stream);
+
+// `verified` 1: --verify has passed, which the text then says.
+void pliant_description_print_json(const pliant_contents *contents, int verified, FILE *stream);
+
+// The numbers that both show, of a model.
+typedef struct pliant_mesh_facts {
+    double low[3], high[3];  // bounding box
+    double volume;
+    int32_t source_count;    // vertices of the input mesh
+} pliant_mesh_facts;
+pliant_mesh_facts pliant_description_mesh(const pliant_model_view *view);
+
+// Faces of a level, were they counted: a quarter of the next finer's.
+int32_t pliant_description_level_faces(const pliant_model_view *view, int32_t level);
+// Bytes of a level's sections.
+uint64_t pliant_description_level_bytes(const pliant_greens_view *greens);

@@ -1,0 +1,331 @@
+// test_info.c: the program pliant-info, as a user meets it.
+#include "tiny_write.h"
+
+#include "image.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <sys/wait.h>
+
+typedef struct answer {
+    int status;
+    char text[100000];  // standard output and error
+} answer;
+
+// Run pliant-info with these arguments (a shell's words).
+static answer *ask(const char *arguments)
+{
+    static answer a;
+    char command[3000];
+    const char *build = getenv("PLIANT_BUILD");
+    snprintf(command, sizeof command, "{ '%s/pliant-info' %s ; } 2>&1 </dev/null", build ? build : "build", arguments);
+    FILE *pipe = popen(command, "r");
+    assert_non_null(pipe);
+    const size_t length = fread(a.text, 1, sizeof a.text - 1, pipe);
+    a.text[length] = 0;
+    const int status = pclose(pipe);
+    assert_true(WIFEXITED(status));
+    a.status = WEXITSTATUS(status);
+    return &a;
+}
+
+static answer *ask_about(const char *options, const char *path)
+{
+    char arguments[2000];
+    snprintf(arguments, sizeof arguments, "%s '%s'", options, path);
+    return ask(arguments);
+}
+
+static void check_answer(const answer *a, int status, const char *part)
+{
+    if (a->status != status) fail_msg("expected exit %d, found %d: %s", status, a->status, a->text);
+    check_contains(a->text, part);
+    // A refusal is one line.
+    if (status != 0) assert_ptr_equal(strchr(a->text, '\n'), a->text + strlen(a->text) - 1);
+}
+
+static const char *write_model(const char *name, int32_t level_count, int supports)
+{
+    pliant_error err;
+    tiny_file file;
+    const char *path = scratch(name);
+    tiny_model_make(level_count, supports, &file);
+    check_ok(tiny_write(&file, path, &err), &err);
+    tiny_free(&file);
+    return path;
+}
+
+// ---- A checker of JSON: returns the end of the value at p, or NULL ----
+
+static const char *skip_space(const char *p)
+{
+    while (*p == ' ' || *p == '\n') p++;
+    return p;
+}
+
+static const char *check_string(const char *p)
+{
+    if (*p++ != '"') return NULL;
+    for (; *p != '"'; p++) {
+        if ((unsigned char)*p < 0x20) return NULL;
+        if (*p == '\\' && !strchr("\"\\/bfnrtu", *++p)) return NULL;
+        if (*p == 'u' && p[-1] == '\\')
+            for (int i = 0; i < 4; i++)
+                if (!isxdigit((unsigned char)*++p)) return NULL;
+    }
+    return p + 1;
+}
+
+static const char *check_value(const char *p)
+{
+    p = skip_space(p);
+    const char close = *p == '{' ? '}' : ']';
+    if (*p == '"') return check_string(p);
+    if (*p != '{' && *p != '[') {
+        for (const char *const *word = (const char *const[]){"true", "false", "null", NULL}; *word; word++)
+            if (strncmp(p, *word, strlen(*word)) == 0) return p + strlen(*word);
+        char *end;
+        if (*p != '-' && !isdigit((unsigned char)*p)) return NULL;
+        strtod(p, &end);
+        return end;
+    }
+    p = skip_space(p + 1);
+    if (*p == close) return p + 1;
+    for (;;) {
+        if (close == '}') {
+            p = check_string(skip_space(p));
+            if (!p || *(p = skip_space(p)) != ':') return NULL;
+            p++;
+        }
+        p = check_value(p);
+        if (!p) return NULL;
+        p = skip_space(p);
+        if (*p == close) return p + 1;
+        if (*p++ != ',') return NULL;
+    }
+}
+
+static void check_json(const char *text)
+{
+    const char *end = check_value(text);
+    if (!end || *skip_space(end) != 0) fail_msg("not JSON: %s", text);
+}
+
+// ---- Cases ----
+
+static void model_is_described(void **state)
+{
+    (void)state;
+    const answer *a = ask_about("", write_model("model.h5", 3, 1));
+    check_answer(a, 0, ": Pliant model, format version 1, ");
+    check_contains(a->text, "mesh        66 vertices, 128 faces, 3 levels\n");
+    check_contains(a->text, "level 1         18 vertices         32 faces\n");
+    check_contains(a->text, "from (-1, -1, -1) to (1, 1, 1), volume 1.33333\n");
+    check_contains(a->text, "6 vertices of the input, 60 made by subdivision\n");
+    check_contains(a->text, "material    Young's modulus 1000, Poisson's ratio 0.3, density 1\n");
+    check_contains(a->text, "domains     53 free, 13 fixed\n");
+    check_contains(a->text, "free-free        2       53        937  37.9 kB       3x     0.05    0.015     0.04  butterfly, lifted, zero\n");
+    check_contains(a->text, "fixed-fixed      2       13 ");
+    check_contains(a->text, "gravity     free, fixed\n");
+    check_contains(a->text, "program = pliant-precompute 0.1.0\n");
+    check_contains(a->text, "place = Z\xc3\xbcrich \"quoted\"\n");
+}
+
+static void dense_and_other_files_are_described(void **state)
+{
+    (void)state;
+    pliant_error err;
+    tiny_file file;
+    const char *path = scratch("dense.h5");
+    tiny_dense_make(1, &file);
+    check_ok(tiny_write(&file, path, &err), &err);
+    tiny_free(&file);
+    check_answer(ask_about("", path), 0, ": dense Green's functions, format version 1, ");
+    check_answer(ask_about("", path), 0, "nodes       4 free, 2 fixed\n");
+    check_answer(ask_about("--verify", path), 0, "verified: 8 sections");
+    check_answer(ask_about("--export x.obj", path), 1, "expected a model to export, found a dense file");
+    check_json(ask_about("--json", path)->text);
+
+    pliant_writer *writer;
+    const pliant_section_def other = {"/displacement", PLIANT_F4, 3, {0, 5, 3}};
+    path = scratch("frames.h5");
+    check_ok(pliant_writer_create(path, &other, 1, &writer, &err), &err);
+    check_ok(pliant_writer_commit(writer, &err), &err);
+    check_answer(ask_about("", path), 0, "sections    /displacement f4 [0, 5, 3]\n");
+    check_json(ask_about("--json", path)->text);
+}
+
+static void json_is_json_and_keeps_quotes_and_names(void **state)
+{
+    (void)state;
+    const answer *a = ask_about("--json", write_model("na \"me\\\xff.h5", 2, 1));
+    check_answer(a, 0, "na \\\"me\\\\\\ufffd.h5\",");
+    check_contains(a->text, "\"place\": \"Z\xc3\xbcrich \\\"quoted\\\"\"");
+    check_contains(a->text, "\"domains\": {\"free\": 13, \"fixed\": 5}");
+    check_contains(a->text, "\"block\": \"fixed-free\", \"level\": 1, \"rows\": 5, \"columns\": 13");
+    check_contains(a->text, "\"wavelet\": \"butterfly\", \"lifted\": true, \"boundary\": \"zero\"");
+    assert_null(strstr(a->text, "verified"));
+    check_json(a->text);
+    a = ask_about("--json --verify", scratch("na \"me\\\xff.h5"));
+    check_answer(a, 0, "\"verified\": true");
+    check_json(a->text);
+}
+
+static void damage_is_found_by_verify_alone(void **state)
+{
+    (void)state;
+    const char *path = write_model("damaged.h5", 2, 0);
+    check_answer(ask_about("--verify", path), 0, "verified: 16 sections, ");
+    check_contains(ask_about("--verify", path)->text, "checksums, indices and levels\n");
+    size_t size;
+    unsigned char *bytes = load(path, &size);
+    pliant_entry entry;
+    memcpy(&entry, bytes + sizeof(pliant_header), sizeof entry);  // /mesh/vertices
+    bytes[entry.offset] ^= 1;
+    save(path, bytes, size);
+    free(bytes);
+    check_answer(ask_about("", path), 0, "Pliant model");
+    check_answer(ask_about("--verify", path), 1, "/mesh/vertices: damaged: expected checksum ");
+}
+
+static void wrong_topology_is_found_by_verify(void **state)
+{
+    (void)state;
+    pliant_error err;
+    tiny_file file;
+    const char *path = scratch("twisted.h5");
+    tiny_model_make(2, 0, &file);
+    int32_t *face = tiny_find(&file, "/mesh/faces")->data;
+    const int32_t first = face[0];
+    face[0] = face[1];
+    face[1] = first;  // in range, but turned
+    check_ok(tiny_write(&file, path, &err), &err);
+    tiny_free(&file);
+    check_answer(ask_about("--verify", path), 1, "twisted.h5: /mesh: ");
+}
+
+// Positions of a level are the first of the finest level's, so every level of the octahedron encloses
+// the same volume; vertices come back to the last bit.
+static void levels_are_exported_as_obj_and_ply(void **state)
+{
+    (void)state;
+    const tiny_mesh mesh = tiny_mesh_make(3);
+    const char *path = write_model("export.h5", 3, 0);
+    char arguments[1500];
+    for (int32_t level = 0; level < 3; level++) {
+        const char *output = scratch("out.OBJ");
+        snprintf(arguments, sizeof arguments, "--export '%s' --level %d '%s'", output, (int)level, path);
+        assert_int_equal(ask(arguments)->status, 0);
+        FILE *file = fopen(output, "r");
+        assert_non_null(file);
+        char line[200];
+        int32_t vertex = 0, face = 0;
+        while (fgets(line, sizeof line, file)) {
+            double x[3];
+            int v[3];
+            if (sscanf(line, "v %lf %lf %lf", &x[0], &x[1], &x[2]) == 3) {
+                assert_memory_equal(x, mesh.vertices[vertex], sizeof x);
+                vertex++;
+            } else if (sscanf(line, "f %d %d %d", &v[0], &v[1], &v[2]) == 3) {
+                for (int k = 0; k < 3; k++) assert_in_range(v[k], 1, mesh.level_vertex_count[level]);
+                if (level == 2 && face < mesh.face_count)
+                    for (int k = 0; k < 3; k++) assert_int_equal(v[k], mesh.faces[face][k] + 1);
+                face++;
+            }
+        }
+        fclose(file);
+        assert_int_equal(vertex, mesh.level_vertex_count[level]);
+        assert_int_equal(face, 8 << 2 * level);
+    }
+
+    const char *output = scratch("out.ply");
+    snprintf(arguments, sizeof arguments, "--export '%s' '%s'", output, path);
+    check_answer(ask(arguments), 0, "");
+    size_t size;
+    unsigned char *bytes = load(output, &size);
+    bytes[size] = 0;
+    const char *body = strstr((char *)bytes, "end_header\n");
+    assert_non_null(body);
+    check_contains((char *)bytes, "element vertex 66\n");
+    const size_t begin = (size_t)(body - (char *)bytes) + strlen("end_header\n");
+    assert_int_equal(size - begin, 66 * 24 + 128 * 13);
+    assert_memory_equal(bytes + begin, mesh.vertices, 66 * 24);
+    assert_int_equal(bytes[begin + 66 * 24], 3);
+    assert_memory_equal(bytes + begin + 66 * 24 + 1, mesh.faces[0], 12);
+    free(bytes);
+    assert_false(exists(scratch("out.ply.tmp")));
+    assert_false(exists(scratch("out.OBJ.tmp")));
+}
+
+static void exports_that_cannot_be_written_leave_nothing(void **state)
+{
+    (void)state;
+    const char *path = write_model("model.h5", 2, 0);
+    char arguments[1500];
+    snprintf(arguments, sizeof arguments, "--export '%s' '%s'", scratch("no/out.obj"), path);
+    check_answer(ask(arguments), 1, strerror(ENOENT));
+    snprintf(arguments, sizeof arguments, "--export '%s' --level 2 '%s'", scratch("out2.obj"), path);
+    check_answer(ask(arguments), 2, "--level: expected 0 to 1, found 2");
+    assert_false(exists(scratch("out2.obj")));
+    mkdir(scratch("folder.ply"), 0777);
+    snprintf(arguments, sizeof arguments, "--export '%s' '%s'", scratch("folder.ply"), path);
+    check_answer(ask(arguments), 1, "folder.ply: expected a file to replace");
+    // A limit of one block of 512 bytes on files: the mesh does not fit.
+    snprintf(arguments, sizeof arguments, "--version; ulimit -f 1; trap '' XFSZ; '%s/pliant-info' --export '%s' '%s'",
+             getenv("PLIANT_BUILD") ? getenv("PLIANT_BUILD") : "build", scratch("big.obj"), path);
+    const answer *a = ask(arguments);
+    assert_int_equal(a->status, 1);
+    check_contains(a->text, strerror(EFBIG));
+    assert_false(exists(scratch("big.obj")));
+    assert_false(exists(scratch("big.obj.tmp")));
+}
+
+static void misuse_exits_with_2_and_failure_with_1(void **state)
+{
+    (void)state;
+    check_answer(ask("--help"), 0, "usage: pliant-info [options] FILE.h5\n");
+    check_answer(ask("-h"), 0, "--verify");
+    check_answer(ask("--version"), 0, "pliant-info " PLIANT_VERSION_TEXT "\n");
+    check_answer(ask(""), 2, "pliant-info: expected one file, found 0");
+    check_answer(ask("a b"), 2, "pliant-info: expected one file, found 2");
+    check_answer(ask("-x a"), 2, "pliant-info: -x: unknown option");
+    check_answer(ask("--nonsense a"), 2, "pliant-info: --nonsense: unknown");
+    check_answer(ask("a --export"), 2, "pliant-info: --export: expected a value, found none");
+    check_answer(ask("--export out.stl a"), 2, "pliant-info: --export: expected a name that ends in .obj or .ply, found \"out.stl\"");
+    check_answer(ask("--export dir.obj/out a"), 2, "expected a name that ends in .obj or .ply");
+    check_answer(ask("--level 1 a"), 2, "pliant-info: --level: expected --export with it, found none");
+    check_answer(ask("--export a.obj --level x a"), 2, "pliant-info: --level: expected 0 to 15, found \"x\"");
+    check_answer(ask("--export a.obj --level -1 a"), 2, "pliant-info: --level: expected 0 to 15, found \"-1\"");
+    check_answer(ask("--json=3 a"), 2, "pliant-info: --json=3: unknown, ambiguous or with a value");
+    check_answer(ask("-- --json"), 1, "pliant-info: --json: No such file or directory");
+    check_answer(ask("/tmp"), 1, "pliant-info: /tmp: expected a file, found a directory");
+    check_answer(ask("Makefile"), 1, "pliant-info: Makefile: not a Pliant model");
+}
+
+static void lost_output_is_noticed(void **state)
+{
+    (void)state;
+    char arguments[1000];
+    const char *path = write_model("model.h5", 2, 0);
+    snprintf(arguments, sizeof arguments, "'%s' >/dev/full", path);
+    check_answer(ask(arguments), 1, "pliant-info: standard output: No space left on device");
+    check_answer(ask("--help >/dev/full"), 1, "pliant-info: standard output: No space left on device");
+    snprintf(arguments, sizeof arguments, "'%s' >&-", path);
+    check_answer(ask(arguments), 1, "pliant-info: standard output: Bad file descriptor");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(model_is_described),
+        cmocka_unit_test(dense_and_other_files_are_described),
+        cmocka_unit_test(json_is_json_and_keeps_quotes_and_names),
+        cmocka_unit_test(damage_is_found_by_verify_alone),
+        cmocka_unit_test(wrong_topology_is_found_by_verify),
+        cmocka_unit_test(levels_are_exported_as_obj_and_ply),
+        cmocka_unit_test(exports_that_cannot_be_written_leave_nothing),
+        cmocka_unit_test(misuse_exits_with_2_and_failure_with_1),
+        cmocka_unit_test(lost_output_is_noticed),
+    };
+    return cmocka_run_group_tests(tests, NULL, scratch_clean);
+}
