@@ -226,6 +226,7 @@ FUZZERS      := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
 build/fuzz/%: tests/fuzz/%.c $(SRC_common) $(SRC_formats) $(SRC_runtime) $(wildcard */include/pliant/*.h formats/*.h runtime/*.h)
 	@mkdir -p $(@D); echo "  fuzz $@"
 	@clang -std=c11 -D_GNU_SOURCE -g -O1 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined $(MATHS) $(I_tests) $< $(SRC_common) $(SRC_formats) $(SRC_runtime) -o $@ $(LAPACK_LIBS) -lm -lpthread
+fuzzers: $(FUZZERS)  ## build the fuzzers
 fuzz: $(FUZZERS)  ## run every fuzzer for FUZZ_SECONDS (60)
 	@for f in $(FUZZERS); do scripts/run-fuzzer $$f $(FUZZ_SECONDS) || exit 1; done
 
@@ -258,5 +259,5 @@ install: all $(OUT)/pliant.pc  ## install under PREFIX (/usr/local), staged by D
 	install -m 644 common/include/pliant/base.h runtime/include/pliant/pliant.h $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 644 $(OUT)/pliant.pc $(DESTDIR)$(PREFIX)/lib/pkgconfig
 
-.PHONY: all runtime help configure clean tests check bench fuzz headers layers format install
+.PHONY: all runtime help configure clean tests check bench fuzz fuzzers headers layers format install
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)

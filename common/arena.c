@@ -28,9 +28,12 @@ pliant_status pliant_arena_reserve(pliant_arena *arena, pliant_error *err)
     assert(!arena->base);
     const size_t size = arena->used;
     // aligned_alloc wants a multiple of the alignment, which every take leaves, and not nothing.
-    char *base = size == SIZE_MAX ? NULL : aligned_alloc(PLIANT_ARENA_ALIGN, size ? size : PLIANT_ARENA_ALIGN);
+    char *base = size == SIZE_MAX
+                     ? NULL
+                     : aligned_alloc(PLIANT_ARENA_ALIGN, size ? size : PLIANT_ARENA_ALIGN);
     if (!base)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "memory: expected %zu bytes, found less", size);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "memory: expected %zu bytes, found less",
+                                size);
     // Writing every page now keeps page faults out of the first frames.
     memset(base, 0, size);
     *arena = (pliant_arena){.base = base, .used = 0, .size = size};

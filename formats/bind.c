@@ -13,11 +13,12 @@ pliant_status pliant_bind_find(const pliant_reader *reader, const char *path,
     const pliant_section *s = pliant_reader_find(reader, path);
     const char *name = pliant_reader_name(reader);
     if (!s)
-        return pliant_error_set(err, PLIANT_ERR_MISSING, "%s: %s: expected this section, found none",
-                                name, path);
+        return pliant_error_set(err, PLIANT_ERR_MISSING,
+                                "%s: %s: expected this section, found none", name, path);
     if (s->type != type || s->rank != rank)
-        return pliant_error_set(err, PLIANT_ERR_FORMAT, "%s: %s: expected %s of rank %d, found %s of rank %d",
-                                name, path, pliant_section_type_text(type), (int)rank,
+        return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                "%s: %s: expected %s of rank %d, found %s of rank %d", name, path,
+                                pliant_section_type_text(type), (int)rank,
                                 pliant_section_type_text(s->type), (int)s->rank);
     *section = s;
     return PLIANT_OK;
@@ -28,10 +29,10 @@ pliant_status pliant_bind_shape(const pliant_reader *reader, const pliant_sectio
 {
     for (int32_t d = 0; d < section->rank; d++)
         if (section->shape[d] != extent[d])
-            return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                    "%s: %s: expected length %" PRIu64 " along axis %d, found %" PRIu64,
-                                    pliant_reader_name(reader), section->path, extent[d], (int)d,
-                                    section->shape[d]);
+            return pliant_error_set(
+                err, PLIANT_ERR_FORMAT,
+                "%s: %s: expected length %" PRIu64 " along axis %d, found %" PRIu64,
+                pliant_reader_name(reader), section->path, extent[d], (int)d, section->shape[d]);
     return PLIANT_OK;
 }
 
@@ -39,10 +40,9 @@ pliant_status pliant_bind_count(const pliant_reader *reader, const pliant_sectio
                                 int32_t least, int32_t limit, int32_t *count, pliant_error *err)
 {
     if (section->shape[0] < (uint64_t)least || section->shape[0] > (uint64_t)limit)
-        return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                "%s: %s: expected length %d to %d, found %" PRIu64,
-                                pliant_reader_name(reader), section->path, (int)least, (int)limit,
-                                section->shape[0]);
+        return pliant_error_set(
+            err, PLIANT_ERR_FORMAT, "%s: %s: expected length %d to %d, found %" PRIu64,
+            pliant_reader_name(reader), section->path, (int)least, (int)limit, section->shape[0]);
     *count = (int32_t)section->shape[0];
     return PLIANT_OK;
 }
@@ -95,11 +95,10 @@ pliant_status pliant_bind_indices(const pliant_reader *reader, const pliant_sect
     int64_t bound = low;
     for (uint64_t i = 0; i < section->count; i++) {
         if (x[i] < bound || x[i] >= high)
-            return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                    "%s: %s: element %" PRIu64 ": expected %" PRId64 " to %" PRId64
-                                    ", found %d",
-                                    pliant_reader_name(reader), section->path, i, bound, high - 1,
-                                    (int)x[i]);
+            return pliant_error_set(
+                err, PLIANT_ERR_FORMAT,
+                "%s: %s: element %" PRIu64 ": expected %" PRId64 " to %" PRId64 ", found %d",
+                pliant_reader_name(reader), section->path, i, bound, high - 1, (int)x[i]);
         if (order == PLIANT_ASCENDING) bound = (int64_t)x[i] + 1;
     }
     return PLIANT_OK;

@@ -26,10 +26,8 @@ static pliant_status check_disjoint(const pliant_reader *reader, const pliant_de
                                     "%s: /dense/fixed-nodes: element %d: expected a vertex that is "
                                     "not free, found %d",
                                     pliant_reader_name(reader), (int)j, (int)v->fixed_nodes[j]);
-        if (v->nodes[i] < v->fixed_nodes[j])
-            i++;
-        else
-            j++;
+        if (v->nodes[i] < v->fixed_nodes[j]) i++;
+        else j++;
     }
     return PLIANT_OK;
 }
@@ -53,7 +51,8 @@ pliant_status pliant_dense_view_bind(const pliant_reader *reader, pliant_dense_v
     if (status == PLIANT_OK && v.has_supports) {
         status = pliant_bind_find(reader, "/dense/fixed-nodes", PLIANT_I4, 1, &section, err);
         if (status == PLIANT_OK)
-            status = pliant_bind_count(reader, section, 0, PLIANT_VERTEX_LIMIT, &v.fixed_count, err);
+            status =
+                pliant_bind_count(reader, section, 0, PLIANT_VERTEX_LIMIT, &v.fixed_count, err);
     }
     if (status < 0) return status;
 
@@ -69,7 +68,8 @@ pliant_status pliant_dense_view_bind(const pliant_reader *reader, pliant_dense_v
     if (PLIANT_##presence == PLIANT_ALWAYS || v.has_supports) {                                    \
         const uint64_t shape[3] = {extent[PLIANT_EXTENT_##a], extent[PLIANT_EXTENT_##b],           \
                                    extent[PLIANT_EXTENT_##c]};                                     \
-        status = pliant_bind_find(reader, path, PLIANT_##section_type, section_rank, &section, err);\
+        status =                                                                                   \
+            pliant_bind_find(reader, path, PLIANT_##section_type, section_rank, &section, err);    \
         if (status == PLIANT_OK) status = pliant_bind_shape(reader, section, shape, err);          \
         if (status == PLIANT_OK)                                                                   \
             status = section->type == PLIANT_I4                                                    \

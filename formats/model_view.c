@@ -58,8 +58,8 @@ static pliant_status count_all(binding *b, pliant_error *err)
         {b->section.fixed_nodes, 0, PLIANT_VERTEX_LIMIT, &v->fixed_count, PLIANT_EXTENT_FIXED},
     };
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        const pliant_status status = pliant_bind_count(b->reader, counts[i].section, counts[i].least,
-                                                       counts[i].limit, counts[i].count, err);
+        const pliant_status status = pliant_bind_count(
+            b->reader, counts[i].section, counts[i].least, counts[i].limit, counts[i].count, err);
         if (status < 0) return status;
         b->extent[counts[i].extent] = (uint64_t)*counts[i].count;
     }
@@ -82,9 +82,10 @@ static pliant_status check_level_counts(binding *b, pliant_error *err)
     if (status < 0) return status;
     const int32_t last = v->level_vertex_count[v->level_count - 1];
     if (last != v->vertex_count)
-        return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                "%s: /mesh/level_count: finest level: expected %d vertices, found %d",
-                                b->name, (int)v->vertex_count, (int)last);
+        return pliant_error_set(
+            err, PLIANT_ERR_FORMAT,
+            "%s: /mesh/level_count: finest level: expected %d vertices, found %d", b->name,
+            (int)v->vertex_count, (int)last);
     b->extent[PLIANT_EXTENT_ODD] = (uint64_t)(v->vertex_count - v->level_vertex_count[0]);
     return PLIANT_OK;
 }
@@ -111,10 +112,11 @@ static pliant_status check_material(const binding *b, pliant_error *err)
 {
     const double *x = b->view->material;
     if (x[0] > 0 && x[1] > -1 && x[1] < 0.5 && x[2] >= 0) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                            "%s: /material: expected young > 0, poisson in (-1, 0.5), density >= 0, "
-                            "found %g, %g, %g",
-                            b->name, x[0], x[1], x[2]);
+    return pliant_error_set(
+        err, PLIANT_ERR_FORMAT,
+        "%s: /material: expected young > 0, poisson in (-1, 0.5), density >= 0, "
+        "found %g, %g, %g",
+        b->name, x[0], x[1], x[2]);
 }
 
 // The parents of a vertex of level l + 1 are two different vertices of level l.
@@ -128,11 +130,11 @@ static pliant_status check_parents(const binding *b, pliant_error *err)
             if (p[0] >= 0 && p[1] >= 0 && p[0] < count[level - 1] && p[1] < count[level - 1] &&
                 p[0] != p[1])
                 continue;
-            return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                    "%s: /mesh/parents: vertex %d of level %d: expected two vertices "
-                                    "below %d, found %d and %d",
-                                    b->name, (int)vertex, (int)level, (int)count[level - 1],
-                                    (int)p[0], (int)p[1]);
+            return pliant_error_set(
+                err, PLIANT_ERR_FORMAT,
+                "%s: /mesh/parents: vertex %d of level %d: expected two vertices "
+                "below %d, found %d and %d",
+                b->name, (int)vertex, (int)level, (int)count[level - 1], (int)p[0], (int)p[1]);
         }
     }
     return PLIANT_OK;
@@ -184,7 +186,8 @@ static pliant_status check_text(const binding *b, pliant_error *err)
     const size_t length = (size_t)b->view->provenance_bytes;
     size_t wrong = pliant_utf8_check(text, length);
     for (size_t i = 0; i < wrong; i++)
-        if (((unsigned char)text[i] < 0x20 && text[i] != '\n' && text[i] != '\t') || text[i] == 0x7f)
+        if (((unsigned char)text[i] < 0x20 && text[i] != '\n' && text[i] != '\t') ||
+            text[i] == 0x7f)
             wrong = i;
     if (wrong == length) return PLIANT_OK;
     return pliant_error_set(err, PLIANT_ERR_FORMAT,
@@ -204,18 +207,19 @@ static pliant_status check_contents(const binding *b, pliant_error *err)
     if (status == PLIANT_OK)
         status = pliant_bind_indices(b->reader, b->section.faces, 0, n, PLIANT_ANY_ORDER, err);
     if (status == PLIANT_OK)
-        status = pliant_bind_indices(b->reader, b->section.source_index, -1,
-                                     (int64_t)INT32_MAX + 1, PLIANT_ANY_ORDER, err);
+        status = pliant_bind_indices(b->reader, b->section.source_index, -1, (int64_t)INT32_MAX + 1,
+                                     PLIANT_ANY_ORDER, err);
     if (status == PLIANT_OK)
         status = pliant_bind_indices(b->reader, b->section.free_nodes, 0, n, PLIANT_ASCENDING, err);
     if (status == PLIANT_OK)
-        status = pliant_bind_indices(b->reader, b->section.fixed_nodes, 0, n, PLIANT_ASCENDING, err);
+        status =
+            pliant_bind_indices(b->reader, b->section.fixed_nodes, 0, n, PLIANT_ASCENDING, err);
     if (status == PLIANT_OK) status = check_material(b, err);
     if (status == PLIANT_OK) status = check_parents(b, err);
     if (status == PLIANT_OK) status = check_domains(b, err);
     if (status == PLIANT_OK)
-        status = check_level_offsets(b, b->section.free_level_offset, v->free_nodes, v->free_count,
-                                     err);
+        status =
+            check_level_offsets(b, b->section.free_level_offset, v->free_nodes, v->free_count, err);
     if (status == PLIANT_OK)
         status = check_level_offsets(b, b->section.fixed_level_offset, v->fixed_nodes,
                                      v->fixed_count, err);
@@ -372,9 +376,9 @@ pliant_status pliant_model_view_bind(const pliant_reader *reader, pliant_model_v
 {
     const char *name = pliant_reader_name(reader);
     if (!pliant_reader_find(reader, "/mesh/vertices"))
-        return pliant_error_set(err, PLIANT_ERR_MISSING,
-                                "%s: not a model: expected /mesh/vertices, found %s", name,
-                                pliant_reader_find(reader, "/dense/nodes") ? "a dense file" : "none");
+        return pliant_error_set(
+            err, PLIANT_ERR_MISSING, "%s: not a model: expected /mesh/vertices, found %s", name,
+            pliant_reader_find(reader, "/dense/nodes") ? "a dense file" : "none");
     pliant_model_view v;
     memset(&v, 0, sizeof v);
     v.has_supports = has_supports(reader);

@@ -92,8 +92,8 @@ static uint64_t hdf5_size(const pliant_reader *r)
 static pliant_status check_header(pliant_reader *r, pliant_header *header, pliant_error *err)
 {
     if (r->size == 0)
-        return pliant_error_set(err, PLIANT_ERR_FORMAT, "%s: empty: expected a model file, found 0 bytes",
-                                r->name);
+        return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                "%s: empty: expected a model file, found 0 bytes", r->name);
     if (r->size < sizeof header->magic || memcmp(r->bytes, PLIANT_MAGIC, sizeof header->magic) != 0)
         return explain(r, err);
     if (r->size < sizeof *header)
@@ -125,10 +125,10 @@ static pliant_status check_header(pliant_reader *r, pliant_header *header, plian
                                     " bytes, found %" PRIu64 "; use the file that "
                                     "pliant-precompute wrote",
                                     r->name, header->file_size, r->size);
-        return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                "%s: %s: expected %" PRIu64 " bytes, found %" PRIu64, r->name,
-                                r->size < header->file_size ? "truncated" : "bytes added at the end",
-                                header->file_size, r->size);
+        return pliant_error_set(
+            err, PLIANT_ERR_FORMAT, "%s: %s: expected %" PRIu64 " bytes, found %" PRIu64, r->name,
+            r->size < header->file_size ? "truncated" : "bytes added at the end", header->file_size,
+            r->size);
     }
     if (r->size < PLIANT_USER_BLOCK)
         return pliant_error_set(err, PLIANT_ERR_FORMAT,
@@ -170,8 +170,8 @@ static pliant_status check_entry(pliant_reader *r, int32_t i, pliant_error *err)
     for (int32_t j = 0; j < i; j++)
         if (strcmp(path, r->paths[j]) == 0)
             return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                    "%s: %s: expected one section of this path, found two",
-                                    r->name, path);
+                                    "%s: %s: expected one section of this path, found two", r->name,
+                                    path);
 
     const pliant_section_type type = (pliant_section_type)entry.type;
     if (pliant_section_type_size(type) == 0)
@@ -197,9 +197,10 @@ static pliant_status check_entry(pliant_reader *r, int32_t i, pliant_error *err)
                                     "%s: %s: expected offset 0 of an empty section, found %" PRIu64,
                                     r->name, path, entry.offset);
     } else if (entry.offset < PLIANT_USER_BLOCK || entry.offset % PLIANT_SECTION_ALIGN != 0) {
-        return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                "%s: %s: expected an offset of %d or more on a page, found %" PRIu64,
-                                r->name, path, PLIANT_USER_BLOCK, entry.offset);
+        return pliant_error_set(
+            err, PLIANT_ERR_FORMAT,
+            "%s: %s: expected an offset of %d or more on a page, found %" PRIu64, r->name, path,
+            PLIANT_USER_BLOCK, entry.offset);
     } else if (entry.offset > r->size || bytes > r->size - entry.offset) {
         return pliant_error_set(err, PLIANT_ERR_FORMAT,
                                 "%s: %s: expected to end within %" PRIu64 " bytes, found %" PRIu64
@@ -251,8 +252,9 @@ static pliant_status create(const char *name, const void *bytes, uint64_t size, 
     if (length > NAME_LIMIT) name += length - NAME_LIMIT, length = NAME_LIMIT;
     pliant_reader *r = calloc(1, sizeof *r + length + 1);
     if (!r)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: expected %zu bytes of memory, found none",
-                                name, sizeof *r + length + 1);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "%s: expected %zu bytes of memory, found none", name,
+                                sizeof *r + length + 1);
     memcpy(r->name, name, length);
     r->bytes = bytes;
     r->size = size;
@@ -373,10 +375,9 @@ pliant_status pliant_reader_verify(const pliant_reader *reader, pliant_error *er
         const pliant_section *s = &reader->sections[i];
         const uint32_t checksum = pliant_crc32c(0, s->data, (size_t)s->bytes);
         if (checksum != s->checksum)
-            return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                    "%s: %s: damaged: expected checksum %08x, found %08x",
-                                    reader->name, s->path, (unsigned)s->checksum,
-                                    (unsigned)checksum);
+            return pliant_error_set(
+                err, PLIANT_ERR_FORMAT, "%s: %s: damaged: expected checksum %08x, found %08x",
+                reader->name, s->path, (unsigned)s->checksum, (unsigned)checksum);
         spans[i] = (pliant_span){.offset = s->offset, .bytes = s->bytes};
     }
     const uint32_t rest =

@@ -14,7 +14,8 @@ struct pliant_script {
     int64_t line;  // of the line read last
     int first;     // no version statement yet
     size_t length;
-    char text[PLIANT_SCRIPT_LINE_LIMIT + 2];  // room for a carriage return and for one byte too many
+    char
+        text[PLIANT_SCRIPT_LINE_LIMIT + 2];  // room for a carriage return and for one byte too many
     char name[];
 };
 
@@ -24,8 +25,7 @@ pliant_status pliant_script_open(const char *path, pliant_script **script, plian
     const char *name = standard ? "standard input" : path;
     FILE *stream = standard ? stdin : fopen(path, "rbe");
     struct stat info;
-    if (!stream)
-        return pliant_error_set(err, PLIANT_ERR_IO, "%.300s: %s", name, strerror(errno));
+    if (!stream) return pliant_error_set(err, PLIANT_ERR_IO, "%.300s: %s", name, strerror(errno));
     if (fstat(fileno(stream), &info) == 0 && S_ISDIR(info.st_mode)) {
         if (!standard) fclose(stream);
         return pliant_error_set(err, PLIANT_ERR_IO, "%.300s: expected a script, found a directory",
@@ -62,9 +62,7 @@ static int read_line(pliant_script *s)
     s->line++;
     for (; c != EOF && c != '\n'; c = getc_unlocked(s->stream))
         if (length < sizeof s->text) s->text[length++] = (char)c;
-    if (c == '\n' && length > 0 && length <= PLIANT_SCRIPT_LINE_LIMIT + 1 &&
-        s->text[length - 1] == '\r')
-        length--;
+    if (c == '\n' && length > 0 && s->text[length - 1] == '\r') length--;
     s->length = length;
     return 1;
 }
@@ -88,8 +86,8 @@ pliant_status pliant_script_next(pliant_script *script, pliant_statement *statem
         size_t length = script->length;
         if (script->line == 1 && length >= 3 && memcmp(text, byte_order_mark, 3) == 0)
             text += 3, length -= 3;
-        const pliant_status status = pliant_statement_parse(text, length, script->name, script->line,
-                                                            script->first, &s, err);
+        const pliant_status status = pliant_statement_parse(text, length, script->name,
+                                                            script->line, script->first, &s, err);
         if (status < 0) return status;
     }
     if (s.kind == PLIANT_STATEMENT_VERSION) script->first = 0;

@@ -9,11 +9,16 @@
 const char *pliant_block_text(pliant_block_name block)
 {
     switch (block) {
-    case PLIANT_FREE_FREE: return "free-free";
-    case PLIANT_FREE_FIXED: return "free-fixed";
-    case PLIANT_FIXED_FREE: return "fixed-free";
-    case PLIANT_FIXED_FIXED: return "fixed-fixed";
-    case PLIANT_BLOCK_COUNT: break;
+    case PLIANT_FREE_FREE:
+        return "free-free";
+    case PLIANT_FREE_FIXED:
+        return "free-fixed";
+    case PLIANT_FIXED_FREE:
+        return "fixed-free";
+    case PLIANT_FIXED_FIXED:
+        return "fixed-fixed";
+    case PLIANT_BLOCK_COUNT:
+        break;
     }
     return "?";
 }
@@ -21,11 +26,16 @@ const char *pliant_block_text(pliant_block_name block)
 size_t pliant_section_type_size(pliant_section_type type)
 {
     switch (type) {
-    case PLIANT_F4: return sizeof(PLIANT_C_F4);
-    case PLIANT_F8: return sizeof(PLIANT_C_F8);
-    case PLIANT_I4: return sizeof(PLIANT_C_I4);
-    case PLIANT_U8: return sizeof(PLIANT_C_U8);
-    case PLIANT_U1: return sizeof(PLIANT_C_U1);
+    case PLIANT_F4:
+        return sizeof(PLIANT_C_F4);
+    case PLIANT_F8:
+        return sizeof(PLIANT_C_F8);
+    case PLIANT_I4:
+        return sizeof(PLIANT_C_I4);
+    case PLIANT_U8:
+        return sizeof(PLIANT_C_U8);
+    case PLIANT_U1:
+        return sizeof(PLIANT_C_U1);
     }
     return 0;
 }
@@ -33,11 +43,16 @@ size_t pliant_section_type_size(pliant_section_type type)
 const char *pliant_section_type_text(pliant_section_type type)
 {
     switch (type) {
-    case PLIANT_F4: return "f4";
-    case PLIANT_F8: return "f8";
-    case PLIANT_I4: return "i4";
-    case PLIANT_U8: return "u8";
-    case PLIANT_U1: return "u1";
+    case PLIANT_F4:
+        return "f4";
+    case PLIANT_F8:
+        return "f8";
+    case PLIANT_I4:
+        return "i4";
+    case PLIANT_U8:
+        return "u8";
+    case PLIANT_U1:
+        return "u1";
     }
     return "unknown type";
 }

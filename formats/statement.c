@@ -235,10 +235,8 @@ static pliant_status parse_probe(cursor *c, pliant_statement *s)
     const pliant_status status = parse_name(c, s);
     if (status < 0) return status;
     const word w = peek(c);
-    if (is_word(w, "vertex"))
-        take(c);
-    else if (!is_word(w, "near"))
-        return refuse(c, PLIANT_ERR_FORMAT, w, "vertex or near");
+    if (is_word(w, "vertex")) take(c);
+    else if (!is_word(w, "near")) return refuse(c, PLIANT_ERR_FORMAT, w, "vertex or near");
     return parse_vertex(c, &s->vertex);
 }
 
@@ -320,10 +318,9 @@ static pliant_status check_text(const char *text, size_t length, const char *nam
     for (size_t i = 0; i < wrong; i++)
         if (((unsigned char)text[i] < 0x20 && text[i] != '\t') || text[i] == 0x7f) wrong = i;
     if (wrong == length) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                            "%.300s:%lld:%d: expected UTF-8 text, found byte 0x%02x", name,
-                            (long long)line, (int)column_of(text, wrong),
-                            (unsigned char)text[wrong]);
+    return pliant_error_set(
+        err, PLIANT_ERR_FORMAT, "%.300s:%lld:%d: expected UTF-8 text, found byte 0x%02x", name,
+        (long long)line, (int)column_of(text, wrong), (unsigned char)text[wrong]);
 }
 
 static pliant_status parse(cursor *c, int first, pliant_statement *s)
@@ -344,8 +341,9 @@ static pliant_status parse(cursor *c, int first, pliant_statement *s)
         const word rest = peek(c);
         return rest.length > 0 ? refuse(c, PLIANT_ERR_FORMAT, rest, "the end of the line") : status;
     }
-    return refuse(c, PLIANT_ERR_FORMAT, w,
-                  "probe, displace, traction, force, support, gravity, release, dt, step or expect");
+    return refuse(
+        c, PLIANT_ERR_FORMAT, w,
+        "probe, displace, traction, force, support, gravity, release, dt, step or expect");
 }
 
 pliant_status pliant_statement_parse(const char *text, size_t length, const char *name,

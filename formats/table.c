@@ -12,8 +12,7 @@ uint32_t pliant_table_checksum(const void *user_block)
     const size_t field = offsetof(pliant_header, checksum);
     uint32_t crc = pliant_crc32c(0, bytes, field);
     crc = pliant_crc32c(crc, zero, sizeof zero);
-    return pliant_crc32c(crc, bytes + field + sizeof zero,
-                         PLIANT_USER_BLOCK - field - sizeof zero);
+    return pliant_crc32c(crc, bytes + field + sizeof zero, PLIANT_USER_BLOCK - field - sizeof zero);
 }
 
 static int order_spans(const void *a, const void *b)
@@ -43,7 +42,8 @@ int pliant_table_bytes(pliant_section_type type, int32_t rank, const uint64_t *s
     uint64_t product = 1, total;
     for (int32_t d = 0; d < rank; d++) {
         // A zero elsewhere must not hide an absurd length: every partial product counts.
-        if (shape[d] > INT64_MAX || __builtin_mul_overflow(product, shape[d] ? shape[d] : 1, &product))
+        if (shape[d] > INT64_MAX ||
+            __builtin_mul_overflow(product, shape[d] ? shape[d] : 1, &product))
             return 0;
     }
     if (__builtin_mul_overflow(product, pliant_section_type_size(type), &total) ||

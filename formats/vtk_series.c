@@ -15,10 +15,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define INDEX_NAME   "pliant.pvd"
-#define WORK_NAME    "pliant.tmp"
-#define STEP_FORMAT  "pliant_%08lld.vtp"
-#define STEP_PREFIX  "pliant_"
+#define INDEX_NAME  "pliant.pvd"
+#define WORK_NAME   "pliant.tmp"
+#define STEP_FORMAT "pliant_%08lld.vtp"
+#define STEP_PREFIX "pliant_"
 
 enum { NAME_LIMIT = 32, TEXT_LIMIT = 1024 };  // bytes of a step's file name; of a file's fixed text
 
@@ -30,18 +30,18 @@ static const char byte_order[] =
 #endif
 
 struct pliant_vtk_series {
-    char *folder, *work;          // "DIR", "DIR/pliant.tmp"
-    char *path, *target;          // room for a path in work and one in folder
+    char *folder, *work;  // "DIR", "DIR/pliant.tmp"
+    char *path, *target;  // room for a path in work and one in folder
     size_t path_size;
-    int made_folder;              // 1: the folder was not there before
+    int made_folder;  // 1: the folder was not there before
     int32_t vertex_count, face_count;
-    const double *positions;      // borrowed
+    const double *positions;  // borrowed
     int64_t step_count;
-    FILE *index;                  // DIR/pliant.tmp/pliant.pvd
-    char *polys;                  // the cells as XML, the same in every step
+    FILE *index;  // DIR/pliant.tmp/pliant.pvd
+    char *polys;  // the cells as XML, the same in every step
     size_t polys_size;
-    float *values;                // [vertex_count][3], what is being encoded
-    char *text;                   // one whole step's file
+    float *values;  // [vertex_count][3], what is being encoded
+    char *text;     // one whole step's file
     size_t text_capacity;
 };
 
@@ -109,7 +109,7 @@ static int is_own_name(const char *name)
 
 static int is_vtk_name(const char *name)
 {
-    static const char *const endings[] = {".pvd", ".vtp", ".vtu", ".vtk", ".vtm",
+    static const char *const endings[] = {".pvd", ".vtp", ".vtu", ".vtk",  ".vtm",
                                           ".vti", ".vts", ".vtr", ".pvtp", ".pvtu"};
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot && i < sizeof endings / sizeof *endings; i++)
@@ -217,8 +217,7 @@ static pliant_status encode_faces(pliant_vtk_series *series, const pliant_vtk_se
 static pliant_status open_folder(pliant_vtk_series *series, const pliant_vtk_series_def *def,
                                  pliant_error *err)
 {
-    if (mkdir(def->folder, 0777) == 0)
-        series->made_folder = 1;
+    if (mkdir(def->folder, 0777) == 0) series->made_folder = 1;
     else if (errno != EEXIST)
         return pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", def->folder, strerror(errno));
     else if (def->overwrite == PLIANT_VTK_OWN) {
@@ -242,8 +241,8 @@ static pliant_status open_folder(pliant_vtk_series *series, const pliant_vtk_ser
     return PLIANT_OK;
 }
 
-pliant_status pliant_vtk_series_create(const pliant_vtk_series_def *def,
-                                       pliant_vtk_series **series, pliant_error *err)
+pliant_status pliant_vtk_series_create(const pliant_vtk_series_def *def, pliant_vtk_series **series,
+                                       pliant_error *err)
 {
     if (def->vertex_count < 0 || def->face_count < 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: %d vertices and %d faces",
@@ -353,8 +352,8 @@ pliant_status pliant_vtk_series_add(pliant_vtk_series *series, double time,
 {
     const int64_t number = series->step_count + 1;
     name_step(series->path, series->path_size, series->work, number);
-    const pliant_status status = write_file(series->path, series->text,
-                                            compose(series, displacement, traction), err);
+    const pliant_status status =
+        write_file(series->path, series->text, compose(series, displacement, traction), err);
     if (status < 0) return status;
     series->step_count = number;
     fprintf(series->index, "<DataSet timestep=\"%.12g\" part=\"0\" file=\"" STEP_FORMAT "\"/>\n",
@@ -388,8 +387,8 @@ pliant_status pliant_vtk_series_commit(pliant_vtk_series *series, pliant_error *
             snprintf(series->target, series->path_size, "%s/" INDEX_NAME, series->folder);
         }
         if (rename(series->path, series->target) != 0)
-            status = pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", series->target,
-                                      strerror(errno));
+            status =
+                pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", series->target, strerror(errno));
     }
     if (status < 0) {
         remove_own(series->folder);

@@ -21,8 +21,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// One H5Dwrite moves at most this: more than 2 GiB in a call fails in some builds of HDF5.
-#define SLICE_BYTES ((uint64_t)1 << 30)
+// One H5Dwrite moves about this much: more than 2 GiB in a call fails in some builds of HDF5, and
+// larger slices than these are no faster.
+#define SLICE_BYTES ((uint64_t)16 << 20)
 
 // Disk space reserved beyond the sections: attributes and HDF5's own headers.
 #define METADATA_BYTES ((uint64_t)256 << 10)
@@ -104,11 +105,16 @@ static pliant_status refuse_system(const char *path, int error, pliant_error *er
 static hid_t file_type(pliant_section_type type)
 {
     switch (type) {
-    case PLIANT_F4: return H5T_IEEE_F32LE;
-    case PLIANT_F8: return H5T_IEEE_F64LE;
-    case PLIANT_I4: return H5T_STD_I32LE;
-    case PLIANT_U8: return H5T_STD_U64LE;
-    case PLIANT_U1: return H5T_STD_U8LE;
+    case PLIANT_F4:
+        return H5T_IEEE_F32LE;
+    case PLIANT_F8:
+        return H5T_IEEE_F64LE;
+    case PLIANT_I4:
+        return H5T_STD_I32LE;
+    case PLIANT_U8:
+        return H5T_STD_U64LE;
+    case PLIANT_U1:
+        return H5T_STD_U8LE;
     }
     return H5I_INVALID_HID;
 }
@@ -116,11 +122,16 @@ static hid_t file_type(pliant_section_type type)
 static hid_t memory_type(pliant_section_type type)
 {
     switch (type) {
-    case PLIANT_F4: return H5T_NATIVE_FLOAT;
-    case PLIANT_F8: return H5T_NATIVE_DOUBLE;
-    case PLIANT_I4: return H5T_NATIVE_INT32;
-    case PLIANT_U8: return H5T_NATIVE_UINT64;
-    case PLIANT_U1: return H5T_NATIVE_UINT8;
+    case PLIANT_F4:
+        return H5T_NATIVE_FLOAT;
+    case PLIANT_F8:
+        return H5T_NATIVE_DOUBLE;
+    case PLIANT_I4:
+        return H5T_NATIVE_INT32;
+    case PLIANT_U8:
+        return H5T_NATIVE_UINT64;
+    case PLIANT_U1:
+        return H5T_NATIVE_UINT8;
     }
     return H5I_INVALID_HID;
 }
@@ -160,8 +171,9 @@ static pliant_status check_definitions(const char *path, const pliant_section_de
                                        int32_t section_count, pliant_error *err)
 {
     if (section_count < 1 || section_count > PLIANT_SECTION_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.300s: expected 1 to %d sections, found %d",
-                                path, PLIANT_SECTION_LIMIT, (int)section_count);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "%.300s: expected 1 to %d sections, found %d", path,
+                                PLIANT_SECTION_LIMIT, (int)section_count);
     for (int32_t i = 0; i < section_count; i++) {
         const pliant_section_def *s = &sections[i];
         uint64_t count, bytes;
@@ -236,9 +248,8 @@ static pliant_status build_skeleton(pliant_writer *w, void **image, size_t *size
     if (status == PLIANT_OK) status = create_sections(w, err);
     if (status == PLIANT_OK) {
         // The image begins behind the user block.
-        const ssize_t bytes = H5Fflush(w->file, H5F_SCOPE_GLOBAL) < 0
-                                  ? -1
-                                  : H5Fget_file_image(w->file, NULL, 0);
+        const ssize_t bytes =
+            H5Fflush(w->file, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(w->file, NULL, 0);
         *image = bytes > 0 ? malloc((size_t)bytes) : NULL;
         if (!*image || H5Fget_file_image(w->file, *image, (size_t)bytes) != bytes)
             status = refuse_hdf5(w, "create", err);
@@ -312,9 +323,10 @@ static pliant_status place_sections(pliant_writer *w, pliant_error *err)
         // HDF5 gives a dataset without elements no place in the file; the table says offset 0.
         const haddr_t offset = s->count > 0 ? H5Dget_offset(s->set) : 0;
         if (offset == HADDR_UNDEF || offset % PLIANT_SECTION_ALIGN != 0)
-            status = pliant_error_set(err, PLIANT_ERR_IO,
-                                      "%s: %s: expected a place on a page of the file, found %" PRIu64,
-                                      w->path, s->def.path, (uint64_t)offset);
+            status =
+                pliant_error_set(err, PLIANT_ERR_IO,
+                                 "%s: %s: expected a place on a page of the file, found %" PRIu64,
+                                 w->path, s->def.path, (uint64_t)offset);
         s->offset = (uint64_t)offset;
     }
     return status;
@@ -352,8 +364,9 @@ pliant_status pliant_writer_create(const char *path, const pliant_section_def *s
     }
     if (!w || !w->path || !w->temporary) {
         if (w) end(w);
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%.300s: expected %zu bytes of memory, found none",
-                                path, sizeof *w);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "%.300s: expected %zu bytes of memory, found none", path,
+                                sizeof *w);
     }
     memcpy(w->path, path, length + 1);
     memcpy(w->temporary, path, length);
@@ -401,16 +414,19 @@ pliant_status pliant_writer_write(pliant_writer *writer, const char *path, const
 {
     written_section *s = find(writer, path);
     if (!s)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.300s: %s: expected a section of the file, found none of this path",
-                                writer->path, path);
+        return pliant_error_set(
+            err, PLIANT_ERR_ARGUMENT,
+            "%.300s: %s: expected a section of the file, found none of this path", writer->path,
+            path);
     hsize_t from[3] = {0}, size[3] = {1, 1, 1};
     uint64_t elements = 1, row_bytes = pliant_section_type_size(s->def.type);
     for (int32_t d = 0; d < s->def.rank; d++) {
         if (start[d] > s->def.shape[d] || count[d] > s->def.shape[d] - start[d])
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "%.300s: %s: expected indices below %" PRIu64 " along axis %d, found "
-                                    "%" PRIu64 " from %" PRIu64,
-                                    writer->path, path, s->def.shape[d], (int)d, count[d], start[d]);
+            return pliant_error_set(
+                err, PLIANT_ERR_ARGUMENT,
+                "%.300s: %s: expected indices below %" PRIu64 " along axis %d, found "
+                "%" PRIu64 " from %" PRIu64,
+                writer->path, path, s->def.shape[d], (int)d, count[d], start[d]);
         from[d] = (hsize_t)start[d];
         size[d] = (hsize_t)count[d];
         elements *= count[d];
@@ -428,10 +444,8 @@ pliant_status pliant_writer_write(pliant_writer *writer, const char *path, const
         result = write_slice(s, from, size, bytes + row * row_bytes);
     }
     pliant_status status = PLIANT_OK;
-    if (result < 0)
-        status = refuse_hdf5(writer, path, err);
-    else
-        s->written += elements;
+    if (result < 0) status = refuse_hdf5(writer, path, err);
+    else s->written += elements;
     restore(saved);
     return status;
 }
@@ -469,13 +483,15 @@ static pliant_status write_text(pliant_writer *w, const char *group, const char 
                                 const char *text, size_t length, pliant_error *err)
 {
     if (length > ATTRIBUTE_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "%.300s: %.90s: attribute %.40s: expected at most %d bytes, found %zu",
-                                w->path, group, name, ATTRIBUTE_LIMIT, length);
+        return pliant_error_set(
+            err, PLIANT_ERR_ARGUMENT,
+            "%.300s: %.90s: attribute %.40s: expected at most %d bytes, found %zu", w->path, group,
+            name, ATTRIBUTE_LIMIT, length);
     const report saved = silence();
     const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
     if (type >= 0) {
-        // A fixed length: variable ones need HDF5's global heap, which mapped readers cannot follow.
+        // A fixed length: variable ones need HDF5's global heap, which mapped readers cannot
+        // follow.
         H5Tset_size(type, length > 0 ? length : 1);
         H5Tset_strpad(type, H5T_STR_NULLPAD);
         H5Tset_cset(type, H5T_CSET_UTF8);
@@ -499,8 +515,8 @@ pliant_status pliant_writer_attribute_number(pliant_writer *writer, const char *
 {
     const report saved = silence();
     const hid_t space = H5Screate(H5S_SCALAR);
-    const pliant_status status = write_attribute(writer, group, name, H5T_IEEE_F64LE, space,
-                                                 H5T_NATIVE_DOUBLE, &value, err);
+    const pliant_status status =
+        write_attribute(writer, group, name, H5T_IEEE_F64LE, space, H5T_NATIVE_DOUBLE, &value, err);
     if (space >= 0) H5Sclose(space);
     restore(saved);
     return status;
@@ -518,9 +534,8 @@ pliant_status pliant_writer_write_summary(pliant_writer *writer, pliant_block_na
         const char *name;
         pliant_summary_item item;
     } numbers[] = {
-        {"eps", PLIANT_SUMMARY_EPS}, {"lifted", PLIANT_SUMMARY_LIFTED},
-        {"rms", PLIANT_SUMMARY_RMS}, {"max", PLIANT_SUMMARY_MAX},
-        {"factor", PLIANT_SUMMARY_FACTOR},
+        {"eps", PLIANT_SUMMARY_EPS}, {"lifted", PLIANT_SUMMARY_LIFTED}, {"rms", PLIANT_SUMMARY_RMS},
+        {"max", PLIANT_SUMMARY_MAX}, {"factor", PLIANT_SUMMARY_FACTOR},
     };
     pliant_status status = pliant_writer_write_all(writer, path, summary, err);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers && status == PLIANT_OK; i++)
@@ -541,11 +556,12 @@ pliant_status pliant_writer_write_provenance(pliant_writer *writer, const char *
     const size_t length = strlen(text);
     if (!s || s->def.type != PLIANT_U1 || s->def.rank != 1 || length > s->bytes)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "%.300s: %s: expected at most %" PRIu64 " bytes, found %zu", writer->path,
-                                path, s ? s->bytes : 0, length);
+                                "%.300s: %s: expected at most %" PRIu64 " bytes, found %zu",
+                                writer->path, path, s ? s->bytes : 0, length);
     char *filled = malloc((size_t)s->bytes + 1);
     if (!filled)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%.300s: %s: expected %" PRIu64 " bytes of memory, found none",
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "%.300s: %s: expected %" PRIu64 " bytes of memory, found none",
                                 writer->path, path, s->bytes);
     memcpy(filled, text, length);
     memset(filled + length, '\n', (size_t)s->bytes - length);
@@ -568,7 +584,8 @@ pliant_status pliant_writer_write_provenance(pliant_writer *writer, const char *
 
 // ---- Commit, abandon ----
 
-// Header and table of a finished file whose bytes are `file`, for its first PLIANT_USER_BLOCK bytes.
+// Header and table of a finished file whose bytes are `file`, for its first PLIANT_USER_BLOCK
+// bytes.
 static void lay_out(const pliant_writer *w, const unsigned char *file, uint64_t size,
                     unsigned char *block)
 {

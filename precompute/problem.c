@@ -4,10 +4,12 @@
 #include "mesh/mesh_check.h"
 #include "mesh/mesh_file.h"
 #include "mesh/region.h"
+#include "node_memory.h"
 #include "refusal.h"
 
 #include "pliant/error.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -33,6 +35,19 @@ static pliant_status hold_listed(const pliant_multires *multires, int32_t input_
     return status;
 }
 
+// A deep subdivision is refused before it is made: the dense system of its vertices is what counts.
+static pliant_status check_size(const pliant_mesh *base, const pliant_options *options, pliant_error *err)
+{
+    // Every level has four faces for one; a closed surface has about half as many vertices as faces.
+    const double vertices = ldexp(base->face_count, 2 * options->subdivide) / 2;
+    const double needed = 2 * 9 * vertices * vertices * sizeof(double), available = pliant_node_available();
+    if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
+    return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                            "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
+                            "memory (%.1f GB are available here): use fewer levels",
+                            options->subdivide, vertices, needed / 1e9, available / 1e9);
+}
+
 // Everything that only one rank needs to do: read, check, refine or detect, hold.
 static pliant_status pose(const pliant_options *options, pliant_progress *progress,
                           pliant_multires **multires, uint8_t **held, pliant_mesh_report *report,
@@ -47,6 +62,7 @@ static pliant_status pose(const pliant_options *options, pliant_progress *progre
         pliant_progress_note(progress, "%s: %d faces looked inwards and were turned", options->mesh,
                              report->turned_count);
 
+    if (options->subdivide >= 0 && (status = check_size(mesh, options, err)) < 0) goto done;
     status = options->subdivide >= 0
                  ? pliant_multires_subdivide(mesh, options->subdivide, options->scheme, multires, err)
                  : pliant_multires_detect(mesh, multires, err);
@@ -56,6 +72,8 @@ static pliant_status pose(const pliant_options *options, pliant_progress *progre
         status = pliant_error_set(err, status, "%s: %.400s", options->mesh, inner.text);
         goto done;
     }
+    if ((*multires)->note.text[0])
+        pliant_progress_note(progress, "%s: %s", options->mesh, (*multires)->note.text);
     const int32_t n = (*multires)->mesh->vertex_count;
     *held = calloc((size_t)n, 1);
     if (!*held) {

@@ -211,12 +211,20 @@ static int narrow(bracket *b, double bound, double t, double sup, double energy)
     return (b->good > 0 && b->bad / b->good < finest_bracket) || b->evaluations == max_evaluations;
 }
 
+// The next of this rank's columns from `index` on whose position is a multiple of stride, or
+// column_count. Positions, not indices: the sample must not depend on how columns were dealt out.
+static int32_t next_column(const searcher *s, int32_t index, int32_t stride)
+{
+    while (index < s->column_count && pliant_spool_column(s->spool, index).column % stride != 0) index++;
+    return index;
+}
+
 // For every stride-th column the largest t_j that meets MAX beside T; without a bound on MAX nothing
 // is kept for the column's sake. Returns this rank's error energy in them.
 static double meet_max(searcher *s, double T, int32_t stride)
 {
     const double bound = s->targets.max > 0 ? s->targets.max : INFINITY;
-    int32_t columns[lanes], next = 0;
+    int32_t columns[lanes], next = next_column(s, 0, stride);
     bracket brackets[lanes];
     double t[lanes], sup[lanes], energy[lanes], total = 0;
     int busy = 0;
@@ -228,7 +236,7 @@ static double meet_max(searcher *s, double T, int32_t stride)
             brackets[k] = (bracket){.bad = INFINITY};
             // Begin at the last t_j, or find out whether T alone is enough.
             t[k] = s->states[next].t > 0 && s->targets.max > 0 ? s->states[next].t : INFINITY;
-            next += stride;
+            next = next_column(s, next + 1, stride);
             busy++;
         }
         if (busy == 0) break;
@@ -357,7 +365,10 @@ static pliant_status keep_lanes(searcher *s, const int32_t *columns, double T, p
 // Every stride-th column from `next` on into the lanes. Returns where to go on.
 static int32_t fill_lanes(const searcher *s, int32_t next, int32_t stride, int32_t *columns)
 {
-    for (int k = 0; k < lanes; k++, next += stride) columns[k] = next < s->column_count ? next : -1;
+    for (int k = 0; k < lanes; k++) {
+        next = next_column(s, next, stride);
+        columns[k] = next < s->column_count ? next++ : -1;
+    }
     return next;
 }
 
@@ -468,9 +479,12 @@ static pliant_status meet_rms(searcher *s, double exact_energy, pliant_kept_set 
                               pliant_threshold_outcome *outcome, pliant_error *err)
 {
     const double target = s->targets.rms * s->targets.rms * exact_energy;
-    const int32_t stride = s->column_count >= least_sample ? sample_stride : 1;
+    int32_t total;
+    MPI_Allreduce(&s->column_count, &total, 1, MPI_INT32_T, MPI_SUM, s->comm);
+    const int32_t stride = total >= least_sample ? sample_stride : 1;
     double sampled = 0, gain = refit_guess;
-    for (int32_t j = 0; j < s->column_count; j += stride) sampled += pliant_spool_column(s->spool, j).energy;
+    for (int32_t j = next_column(s, 0, stride); j < s->column_count; j = next_column(s, j + 1, stride))
+        sampled += pliant_spool_column(s->spool, j).energy;
     sampled = sum_over_ranks(sampled, s->comm);
     double T = guess_threshold(s, target);
     T = sample_threshold(s, stride, sampled, T, &gain);

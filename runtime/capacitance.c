@@ -30,7 +30,8 @@ void pliant_capacitance_scratch_lay_out(pliant_arena *arena, const pliant_model 
     const size_t n = 3 * (size_t)capacity, stride = pliant_dense_stride(n);
     int32_t slots = 0;
     for (int32_t d = 0; d < pliant_capacitance_domain_count(model); d++) {
-        pliant_reconstruction_scratch_lay_out(arena, model->domains[d].wavelet, &scratch->domain[d]);
+        pliant_reconstruction_scratch_lay_out(arena, model->domains[d].wavelet,
+                                              &scratch->domain[d]);
         if (model->domains[d].count > slots) slots = model->domains[d].count;
     }
     PLIANT_TAKE(arena, scratch->positions, capacity);
@@ -44,7 +45,8 @@ void pliant_capacitance_scratch_lay_out(pliant_arena *arena, const pliant_model 
     PLIANT_TAKE(arena, scratch->blocks, (size_t)slots * block_floats);
 }
 
-void pliant_capacitance_scratch_begin(const pliant_model *model, pliant_capacitance_scratch *scratch)
+void pliant_capacitance_scratch_begin(const pliant_model *model,
+                                      pliant_capacitance_scratch *scratch)
 {
     for (int32_t d = 0; d < pliant_capacitance_domain_count(model); d++)
         pliant_reconstruction_scratch_begin(model->domains[d].wavelet, &scratch->domain[d]);
@@ -85,7 +87,8 @@ static void load_column(const pliant_columns *columns, int32_t column, const int
     for (uint64_t e = columns->offset[column]; e < columns->offset[column + 1]; e++) {
         const int32_t slot = slot_of[columns->row[e]];
         if (slot >= 0)
-            memcpy(blocks + (size_t)slot * block_floats, columns->block + 9 * e, 9 * sizeof *blocks);
+            memcpy(blocks + (size_t)slot * block_floats, columns->block + 9 * e,
+                   9 * sizeof *blocks);
     }
 }
 
@@ -95,8 +98,7 @@ void pliant_capacitance_extract(const pliant_model *model, const pliant_capacita
     const size_t stride = capacitance->stride;
     const int32_t *vertices = capacitance->vertices;
     for (int32_t d = 0; d < pliant_capacitance_domain_count(model); d++) {
-        const int32_t rows =
-            list_domain(model, vertices, capacitance->count, d, scratch->index);
+        const int32_t rows = list_domain(model, vertices, capacitance->count, d, scratch->index);
         if (rows == 0) continue;
         const pliant_reconstruction *plan = &capacitance->plan[d];
         const int32_t *slot_of = scratch->domain[d].slot_of;
@@ -118,12 +120,14 @@ void pliant_capacitance_extract(const pliant_model *model, const pliant_capacita
         pliant_reconstruction_unmap(plan, &scratch->domain[d]);
     }
     for (size_t j = 0; j < 3 * (size_t)capacitance->count; j++)
-        for (size_t i = 3 * (size_t)capacitance->count; i < stride; i++) compliance[i + j * stride] = 0;
+        for (size_t i = 3 * (size_t)capacitance->count; i < stride; i++)
+            compliance[i + j * stride] = 0;
 }
 
 // Weight rows by areas and scale rows and columns so that the diagonal is +-1: free and fixed nodes
-// differ in units, and large and small triangles in size. A diagonal that compression destroyed, under
-// 2^-24 of its domain's largest, is scaled by that bound instead of blowing up its row.
+// differ in units, and large and small triangles in size. A diagonal that compression destroyed,
+// under 2^-20 of its domain's largest, says nothing about its node, which then counts as one of the
+// largest.
 static void weigh(const pliant_model *model, const pliant_capacitance *capacitance, double *matrix,
                   double *scale)
 {
@@ -136,7 +140,8 @@ static void weigh(const pliant_model *model, const pliant_capacitance *capacitan
         most[d] = fmax(most[d], scale[k]);
     }
     for (size_t k = 0; k < n; k++) {
-        const double diagonal = fmax(scale[k], 0x1p-24 * most[model->domain[vertices[k / 3]]]);
+        const double limit = most[model->domain[vertices[k / 3]]];
+        const double diagonal = scale[k] >= 0x1p-20 * limit ? scale[k] : limit;
         scale[k] = diagonal > 0 && isfinite(1 / sqrt(diagonal)) ? 1 / sqrt(diagonal) : 1;
     }
     for (size_t j = 0; j < n; j++)
@@ -177,7 +182,8 @@ static int32_t store_inverse(const pliant_model *model, pliant_capacitance *capa
         const double column_scale = -scratch->scale[j] * model->areas[capacitance->vertices[j / 3]];
         float *to = capacitance->inverse + j * stride;
         for (size_t i = 0; i < n; i++) {
-            to[i] = (float)(scratch->work_matrix[i + j * stride] * scratch->scale[i] * column_scale);
+            to[i] =
+                (float)(scratch->work_matrix[i + j * stride] * scratch->scale[i] * column_scale);
             largest = fmaxf(largest, isfinite(to[i]) ? fabsf(to[i]) : INFINITY);
         }
         for (size_t i = n; i < stride; i++) to[i] = 0;
@@ -200,7 +206,8 @@ void pliant_capacitance_build(const pliant_model *model, const int32_t *vertices
     if (invert_shifted(matrix, n, stride, 0, scratch) > least_pivot &&
         store_inverse(model, capacitance, scratch))
         return;
-    // With entries of at most about one no eigenvalue is below -n, and 2^-20 times 16^15 is far beyond.
+    // With entries of at most about one no eigenvalue is below -n, and 2^-20 times 16^15 is far
+    // beyond.
     capacitance->status = PLIANT_ROUGH;
     double shift = 0x1p-20;
     for (int attempt = 0; attempt <= 15; attempt++, shift *= 16)

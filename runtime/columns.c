@@ -15,8 +15,8 @@ void pliant_columns_add_plain(const int32_t *row, const float *block, size_t cou
     for (size_t e = 0; e < count; e++, block += 9) {
         float *to = g + 4 * (size_t)row[e];
         for (int r = 0; r < 3; r++)
-            to[r] += block[3 * r] * value[0] + block[3 * r + 1] * value[1] +
-                     block[3 * r + 2] * value[2];
+            to[r] +=
+                block[3 * r] * value[0] + block[3 * r + 1] * value[1] + block[3 * r + 2] * value[2];
     }
 }
 
@@ -73,8 +73,8 @@ add_avx512(const int32_t *row, const float *block, size_t count, const float *va
 }
 
 // Two blocks, 18 floats: column c of the first from a load at c, of the second from one at 8 + c.
-__attribute__((target("avx2,fma"))) static void
-add_avx2(const int32_t *row, const float *block, size_t count, const float *value, float *g)
+__attribute__((target("avx2,fma"))) static void add_avx2(const int32_t *row, const float *block,
+                                                         size_t count, const float *value, float *g)
 {
     const __m256i first = _mm256_setr_epi32(0, 3, 6, 0, 0, 0, 0, 0);
     const __m256i second = _mm256_setr_epi32(0, 0, 0, 0, 1, 4, 7, 1);

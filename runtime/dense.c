@@ -35,8 +35,8 @@ size_t pliant_dense_work_count(size_t n)
 // C += T R for `row_count` rows (a multiple of 8) and `column_count` columns, depth `depth`. R is
 // [column][depth] with `depth_stride`. Tiles of 24 rows x 4 columns keep 12 sums in registers.
 INLINE void multiply_add(size_t row_count, size_t column_count, size_t depth,
-                                const double *restrict t, size_t t_stride, const double *restrict r,
-                                size_t depth_stride, double *restrict c, size_t c_stride)
+                         const double *restrict t, size_t t_stride, const double *restrict r,
+                         size_t depth_stride, double *restrict c, size_t c_stride)
 {
     size_t j = 0;
     for (; j + 4 <= column_count; j += 4) {
@@ -121,8 +121,8 @@ static void swap_rows(size_t n, size_t stride, double *matrix, size_t a, size_t 
 
 // Eliminate the columns K = k .. k+width-1 of all rows, in place: afterwards they hold what the
 // product G of these steps makes of the unit vectors e_K. 0 when a pivot vanishes.
-INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width,
-                                      double *matrix, int32_t *pivots, double *least, double *most)
+INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, double *matrix,
+                               int32_t *pivots, double *least, double *most)
 {
     for (size_t c = k; c < k + width; c++) {
         double *column = matrix + c * stride;

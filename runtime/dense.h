@@ -26,8 +26,8 @@ size_t pliant_dense_work_count(size_t n);
 int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *work);
 
 // Invert in place, Gauss-Jordan with partial pivoting. Returns the smallest magnitude of a pivot
-// over the largest, 0 when a pivot vanished (the matrix is then garbage). Rows n .. stride-1 must be
-// zero and stay so. `pivots` has shape [n].
+// over the largest, 0 when a pivot vanished (the matrix is then garbage). Rows n .. stride-1 must
+// be zero and stay so. `pivots` has shape [n].
 double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *pivots, double *work);
 
 // y = A x; `y` has shape [stride], 64-byte aligned: rows n .. stride-1 of A must be zero.

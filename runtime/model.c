@@ -46,13 +46,13 @@ static pliant_status bind_greens(pliant_model *model, pliant_error *err)
     const int32_t l = model->finest_level;
     const char *name = pliant_reader_name(model->reader);
     if (!view->greens[PLIANT_FREE_FREE][l].column_offset)
-        return pliant_error_set(err, PLIANT_ERR_MISSING,
-                                "%s: /greens/free-free: expected the columns of level %d, found none",
-                                name, l);
-    const int32_t has_supports =
-        view->has_supports && view->greens[PLIANT_FREE_FIXED][l].column_offset &&
-        view->greens[PLIANT_FIXED_FREE][l].column_offset &&
-        view->greens[PLIANT_FIXED_FIXED][l].column_offset;
+        return pliant_error_set(
+            err, PLIANT_ERR_MISSING,
+            "%s: /greens/free-free: expected the columns of level %d, found none", name, l);
+    const int32_t has_supports = view->has_supports &&
+                                 view->greens[PLIANT_FREE_FIXED][l].column_offset &&
+                                 view->greens[PLIANT_FIXED_FREE][l].column_offset &&
+                                 view->greens[PLIANT_FIXED_FIXED][l].column_offset;
     bind_columns(&view->greens[PLIANT_FREE_FREE][l], &model->greens[0][0]);
     if (!has_supports) return PLIANT_OK;
     bind_columns(&view->greens[PLIANT_FREE_FIXED][l], &model->greens[0][1]);
@@ -62,10 +62,11 @@ static pliant_status bind_greens(pliant_model *model, pliant_error *err)
                       wavelet_of(&view->greens[PLIANT_FREE_FIXED][l])) ||
         !same_wavelet(wavelet_of(&view->greens[PLIANT_FIXED_FREE][l]),
                       wavelet_of(&view->greens[PLIANT_FIXED_FIXED][l])))
-        return pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                "%s: /greens: expected one wavelet for all columns of a row domain, "
-                                "found two",
-                                name);
+        return pliant_error_set(
+            err, PLIANT_ERR_FORMAT,
+            "%s: /greens: expected one wavelet for all columns of a row domain, "
+            "found two",
+            name);
     return PLIANT_OK;
 }
 
@@ -106,13 +107,12 @@ static pliant_status plan_domains(pliant_model *model, pliant_error *err)
         .count = view->fixed_count, .nodes = view->fixed_nodes, .gravity = view->gravity_fixed};
     for (int32_t d = 0; d < PLIANT_DOMAIN_COUNT; d++) {
         pliant_model_domain *domain = &model->domains[d];
-        const pliant_block_name block =
-            d == PLIANT_DOMAIN_FIXED && model->greens[1][0].offset ? PLIANT_FIXED_FREE
-                                                                   : PLIANT_FREE_FREE;
+        const pliant_block_name block = d == PLIANT_DOMAIN_FIXED && model->greens[1][0].offset
+                                            ? PLIANT_FIXED_FREE
+                                            : PLIANT_FREE_FREE;
         const pliant_wavelet_def def = wavelet_of(&view->greens[block][l]);
-        pliant_status status =
-            pliant_wavelet_create(model->hierarchy, model->areas, domain->nodes, domain->count,
-                                  &def, &domain->wavelet, err);
+        pliant_status status = pliant_wavelet_create(model->hierarchy, model->areas, domain->nodes,
+                                                     domain->count, &def, &domain->wavelet, err);
         if (status < 0) return status;
     }
     return PLIANT_OK;
@@ -146,8 +146,7 @@ pliant_status pliant_model_open(const char *path, pliant_model **result, pliant_
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "pliant_model_open: expected a path and a place, found NULL");
     pliant_model *model = calloc(1, sizeof *model);
-    if (!model)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for a model", path);
+    if (!model) return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for a model", path);
 
     pliant_status status = pliant_reader_open(path, &model->reader, err);
     if (status < 0) goto done;

@@ -111,8 +111,9 @@ static void emit_prediction(pliant_reconstruction *plan, pliant_reconstruction_s
     }
 }
 
-void pliant_reconstruction_build(pliant_reconstruction *plan, pliant_reconstruction_scratch *scratch,
-                                 const int32_t *positions, int32_t count, int32_t *slots)
+void pliant_reconstruction_build(pliant_reconstruction *plan,
+                                 pliant_reconstruction_scratch *scratch, const int32_t *positions,
+                                 int32_t count, int32_t *slots)
 {
     const pliant_wavelet *w = plan->wavelet;
     const int32_t finest = w->level_count - 1;

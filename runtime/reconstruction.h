@@ -16,16 +16,16 @@ typedef struct pliant_reconstruction {
     int32_t slot_count;
     int32_t *position;  // shape [slot_count]: the coefficient that a slot starts from
     int32_t op_count;
-    int32_t *target;    // shape [op_count]: slot[target] += sum of weight * slot[source]
-    int32_t *begin;     // shape [op_count + 1]: an op's entries in source and weight
+    int32_t *target;  // shape [op_count]: slot[target] += sum of weight * slot[source]
+    int32_t *begin;   // shape [op_count + 1]: an op's entries in source and weight
     int32_t *source;
     float *weight;
 } pliant_reconstruction;
 
 // What building needs and leaves as it found it; one serves all plans of a domain.
 typedef struct pliant_reconstruction_scratch {
-    int32_t *slot_of;  // shape [count + 1]: slot of a position, -1 between calls
-    int32_t *needed;   // shape [count]: positions whose value is needed, a segment a level
+    int32_t *slot_of;    // shape [count + 1]: slot of a position, -1 between calls
+    int32_t *needed;     // shape [count]: positions whose value is needed, a segment a level
     uint8_t *is_needed;  // shape [count]: 0 between calls
 } pliant_reconstruction_scratch;
 
@@ -40,8 +40,9 @@ void pliant_reconstruction_scratch_begin(const pliant_wavelet *wavelet,
 
 // Plan the values at `positions` (shape [count], any order, repeats allowed); slots[i] tells where
 // the value of positions[i] will be.
-void pliant_reconstruction_build(pliant_reconstruction *plan, pliant_reconstruction_scratch *scratch,
-                                 const int32_t *positions, int32_t count, int32_t *slots);
+void pliant_reconstruction_build(pliant_reconstruction *plan,
+                                 pliant_reconstruction_scratch *scratch, const int32_t *positions,
+                                 int32_t count, int32_t *slots);
 
 // Load the slots from g, shape [m + 1][4], and run; `work` has shape [slot_count][4], both aligned.
 void pliant_reconstruction_run(const pliant_reconstruction *plan, const float *g, float *work);
@@ -50,7 +51,8 @@ void pliant_reconstruction_run(const pliant_reconstruction *plan, const float *g
 // has shape [slot_count][16], 64-byte aligned.
 void pliant_reconstruction_run_blocks(const pliant_reconstruction *plan, float *work);
 
-// For loading a sparse column: map the plan's positions to slots in scratch->slot_of, and back to -1.
+// For loading a sparse column: map the plan's positions to slots in scratch->slot_of, and back to
+// -1.
 void pliant_reconstruction_map(const pliant_reconstruction *plan,
                                pliant_reconstruction_scratch *scratch);
 void pliant_reconstruction_unmap(const pliant_reconstruction *plan,

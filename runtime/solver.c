@@ -19,9 +19,9 @@ static const double unit_roundoff = 0x1p-24;
 // drift grows by 2 u a change, so this comes every 128th change or when a much larger load goes.
 static const double drift_limit = 256 * 0x1p-24;
 
-// Selective queries against the whole transform, at 2045 nodes, butterfly lifted (bench_solver): the
-// transform takes 6 us; a planned query 0.07 us for one node and 6.5 us for 128 scattered ones, a
-// sixteenth of them; making the plan 3.5 us for one node and 7 us for four, a 512th of them.
+// Selective queries against the whole transform, at 2045 nodes, butterfly lifted (bench_solver):
+// the transform takes 6 us; a planned query 0.07 us for one node and 6.5 us for 128 scattered ones,
+// a sixteenth of them; making the plan 3.5 us for one node and 7 us for four, a 512th of them.
 enum { query_part = 16, query_floor = 16, query_at_once_part = 512, query_at_once_floor = 2 };
 // Types kept at most: beyond, a search of the cache would cost what it saves.
 enum { cache_limit = 4096 };
@@ -98,9 +98,9 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
                   {"cache_count", used.cache_count, 1, cache_limit}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
         if (fields[i].value < fields[i].least || fields[i].value > fields[i].most)
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "pliant_solver_def: %s: expected %d to %d, found %d",
-                                    fields[i].name, fields[i].least, fields[i].most, fields[i].value);
+            return pliant_error_set(
+                err, PLIANT_ERR_ARGUMENT, "pliant_solver_def: %s: expected %d to %d, found %d",
+                fields[i].name, fields[i].least, fields[i].most, fields[i].value);
 
     pliant_solver *solver = calloc(1, sizeof *solver);
     if (!solver) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a solver");
@@ -113,8 +113,8 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
     solver->load_capacity = used.load_capacity < n ? used.load_capacity : n;
     solver->cache_count = used.cache_count;
     solver->query_capacity = n / query_part > query_floor ? n / query_part : query_floor;
-    solver->query_at_once = n / query_at_once_part > query_at_once_floor ? n / query_at_once_part
-                                                                        : query_at_once_floor;
+    solver->query_at_once =
+        n / query_at_once_part > query_at_once_floor ? n / query_at_once_part : query_at_once_floor;
 
     lay_out(&solver->arena, solver);
     pliant_status status = pliant_arena_reserve(&solver->arena, err);
@@ -171,8 +171,8 @@ static void add_column(const pliant_solver *solver, int32_t row_domain, int32_t 
     const pliant_columns *columns = &model->greens[row_domain][model->domain[vertex]];
     const uint64_t begin = columns->offset[model->position[vertex]];
     const uint64_t end = columns->offset[model->position[vertex] + 1];
-    solver->add_column(columns->row + begin, columns->block + 9 * begin, (size_t)(end - begin), value,
-                       rows);
+    solver->add_column(columns->row + begin, columns->block + 9 * begin, (size_t)(end - begin),
+                       value, rows);
 }
 
 static void add_load(pliant_solver *solver, pliant_load *load, pliant_vec3 value)
@@ -202,8 +202,8 @@ static void weigh_load(const pliant_solver *solver, pliant_load *load)
 }
 
 // Bounds, for every row domain: |base| <= magnitude = sum of |value| weight (times 3 for the three
-// columns of a block, left out on both sides). Adding `delta` rounds the product, at most 4 u |delta|
-// weight, and the sum, u times magnitude before or after.
+// columns of a block, left out on both sides). Adding `delta` rounds the product, at most 4 u
+// |delta| weight, and the sum, u times magnitude before or after.
 static void add_changes(pliant_solver *solver)
 {
     double moved[PLIANT_DOMAIN_COUNT] = {0};
@@ -243,7 +243,8 @@ static void add_changes(pliant_solver *solver)
     }
 }
 
-// Sum everything again: the drift is then that of a fresh sum, which is what it is measured against.
+// Sum everything again: the drift is then that of a fresh sum, which is what it is measured
+// against.
 static void rebuild_base(pliant_solver *solver)
 {
     int32_t is_loaded = 0;

@@ -16,7 +16,8 @@ typedef struct pliant_load {
     int32_t is_specified;  // 0: released, but still in the sum until the next solve
     pliant_vec3 value;     // as stated
     pliant_vec3 summed;    // as it is in base, which is as it was in the last solve
-    float weight[PLIANT_DOMAIN_COUNT];  // largest number of its column in a row domain; -1: not known
+    float
+        weight[PLIANT_DOMAIN_COUNT];  // largest number of its column in a row domain; -1: not known
 } pliant_load;
 
 // What a domain's rows hold. Rows are [count + 1][4] floats, xyz0, the last one zero.
@@ -26,8 +27,8 @@ typedef struct pliant_field {
     float *g;           // g of step (6), and then values up to level `reconstructed`
     int32_t is_summed;  // 0: g is stale and to be summed when asked for
     int32_t reconstructed;  // 0: coefficients (which the values of level 0 are)
-    double magnitude;   // sum over the specified values of |value| * weight: bounds |base|
-    double drift;       // bound of the rounding error in base, in the same unit
+    double magnitude;       // sum over the specified values of |value| * weight: bounds |base|
+    double drift;           // bound of the rounding error in base, in the same unit
     float gravity_weight;
     // The last selective query's plan.
     pliant_reconstruction plan;
@@ -65,14 +66,15 @@ struct pliant_solver {
     pliant_capacitance *types;  // shape [cache_count]
     int64_t solve_count;
     pliant_capacitance_scratch scratch;
-    int32_t *key;               // shape [capacity]
-    float *contact_values;      // shape [3 capacity]: q of step (4)
-    float *contact_solution;    // shape [stride]
-    int32_t *query_scratch;      // shape [query_capacity]
-    int32_t *all_rows;          // shape [max(m, k)]: 0, 1, 2, ...
+    int32_t *key;             // shape [capacity]
+    float *contact_values;    // shape [3 capacity]: q of step (4)
+    float *contact_solution;  // shape [stride]
+    int32_t *query_scratch;   // shape [query_capacity]
+    int32_t *all_rows;        // shape [max(m, k)]: 0, 1, 2, ...
 };
 
-// Index in `constraints` (shape [count], ascending) of a vertex, or where it would go as -1 - index.
+// Index in `constraints` (shape [count], ascending) of a vertex, or where it would go as -1 -
+// index.
 int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t count, int32_t vertex);
 
 // Step (6): bring a domain's g up to date as coefficients.

@@ -1,8 +1,9 @@
-// statements.c: what the caller says about the boundary: displace, press, support, gravity, release.
+// statements.c: what the caller says about the boundary: displace, press, support, gravity,
+// release.
 //
 // Every vertex is in one of three conditions: reference (nothing said), load (a specified value of
-// the reference type other than zero's default) or constraint (in S, type changed). A statement moves
-// it between them; a load that was summed stays listed until the next solve has taken it out.
+// the reference type other than zero's default) or constraint (in S, type changed). A statement
+// moves it between them; a load that was summed stays listed until the next solve has taken it out.
 #include "solver.h"
 
 #include <math.h>
@@ -41,8 +42,7 @@ int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t cou
 
 static void drop_constraint(pliant_solver *solver, int32_t vertex)
 {
-    const int32_t i =
-        pliant_constraint_find(solver->constraints, solver->constraint_count, vertex);
+    const int32_t i = pliant_constraint_find(solver->constraints, solver->constraint_count, vertex);
     if (i < 0) return;
     solver->constraint_count--;
     memmove(solver->constraints + i, solver->constraints + i + 1,

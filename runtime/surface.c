@@ -10,8 +10,8 @@ static int32_t find_solved(const pliant_solver *solver, int32_t vertex)
     return pliant_constraint_find(solver->solved, solver->solved_count, vertex);
 }
 
-// (7) v = W^-1 g up to `level`, in place. What a coarser level needed has been overwritten, so another
-// level starts from a new sum.
+// (7) v = W^-1 g up to `level`, in place. What a coarser level needed has been overwritten, so
+// another level starts from a new sum.
 static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
 {
     pliant_field *field = &solver->fields[d];
@@ -22,8 +22,8 @@ static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
 }
 
 // Scatter rows of four to packed vertices, ascending. A store of four floats spills one into the
-// next vertex, which is written later: by this loop, or by the caller's pass over the fixed ones. Only
-// the last vertex has nobody behind it.
+// next vertex, which is written later: by this loop, or by the caller's pass over the fixed ones.
+// Only the last vertex has nobody behind it.
 static void pack_free(const float *g, const int32_t *nodes, int32_t count, int32_t vertex_count,
                       pliant_vec3 *u)
 {
@@ -34,9 +34,11 @@ static void pack_free(const float *g, const int32_t *nodes, int32_t count, int32
     if (last < count) memcpy(&u[vertex_count - 1], g + 4 * (size_t)last, sizeof *u);
 }
 
-static void pack_fixed(const float *displacement, const int32_t *nodes, int32_t count, pliant_vec3 *u)
+static void pack_fixed(const float *displacement, const int32_t *nodes, int32_t count,
+                       pliant_vec3 *u)
 {
-    for (int32_t p = 0; p < count; p++) memcpy(&u[nodes[p]], displacement + 4 * (size_t)p, sizeof *u);
+    for (int32_t p = 0; p < count; p++)
+        memcpy(&u[nodes[p]], displacement + 4 * (size_t)p, sizeof *u);
 }
 
 pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant_vec3 *u)

@@ -14,7 +14,7 @@ PLIANT_UNUSED_RESULT pliant_status pliant_region_evaluate(const char *expression
 PLIANT_UNUSED_RESULT pliant_status pliant_region_read(const char *path, int32_t vertex_count,
                                                       uint8_t *held, pliant_error *err);
 
-// Do the held vertices stop every rigid motion? At least three that are not on one line. Refuses
-// also when nothing or everything is held.
+// Do the held vertices stop every rigid motion of every body (a component and its cavities)? At
+// least three that are not on one line. Refuses also when nothing or everything is held.
 PLIANT_UNUSED_RESULT pliant_status pliant_region_check(const pliant_mesh *mesh, const uint8_t *held,
                                                        pliant_error *err);

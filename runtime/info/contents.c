@@ -8,10 +8,14 @@
 const char *pliant_contents_kind_text(pliant_contents_kind kind)
 {
     switch (kind) {
-    case PLIANT_CONTENTS_MODEL: return "model";
-    case PLIANT_CONTENTS_DENSE: return "dense";
-    case PLIANT_CONTENTS_RECORDING: return "recording";
-    case PLIANT_CONTENTS_OTHER: break;
+    case PLIANT_CONTENTS_MODEL:
+        return "model";
+    case PLIANT_CONTENTS_DENSE:
+        return "dense";
+    case PLIANT_CONTENTS_RECORDING:
+        return "recording";
+    case PLIANT_CONTENTS_OTHER:
+        break;
     }
     return "other";
 }
@@ -76,7 +80,8 @@ pliant_status pliant_contents_verify(const pliant_contents *contents, pliant_err
     return status;
 }
 
-int pliant_contents_next_pair(const pliant_contents *contents, size_t *at, pliant_contents_pair *pair)
+int pliant_contents_next_pair(const pliant_contents *contents, size_t *at,
+                              pliant_contents_pair *pair)
 {
     while (*at < contents->text_bytes && contents->text[*at] == '\n') ++*at;
     if (*at >= contents->text_bytes) return 0;

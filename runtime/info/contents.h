@@ -14,10 +14,10 @@ typedef enum pliant_contents_kind {
 
 typedef struct pliant_contents {
     pliant_contents_kind kind;
-    pliant_reader *reader;     // owned
-    pliant_model_view model;   // of a model
-    pliant_dense_view dense;   // of a dense file
-    const char *text;          // provenance, not NUL-terminated; borrowed from reader
+    pliant_reader *reader;    // owned
+    pliant_model_view model;  // of a model
+    pliant_dense_view dense;  // of a dense file
+    const char *text;         // provenance, not NUL-terminated; borrowed from reader
     size_t text_bytes;
 } pliant_contents;
 
@@ -43,4 +43,5 @@ typedef struct pliant_contents_pair {
     const char *key, *value;  // not NUL-terminated
     size_t key_bytes, value_bytes;
 } pliant_contents_pair;
-int pliant_contents_next_pair(const pliant_contents *contents, size_t *at, pliant_contents_pair *pair);
+int pliant_contents_next_pair(const pliant_contents *contents, size_t *at,
+                              pliant_contents_pair *pair);

@@ -59,11 +59,10 @@ static void print_text(const char *text, size_t length, FILE *stream)
         const int size = pliant_utf8_character(text + i, length - i);
         const unsigned char c = (unsigned char)text[i];
         // C1 controls are U+0080 to U+009F.
-        const int control = c < 0x20 || c == 0x7f || (size == 2 && c == 0xc2 && (unsigned char)text[i + 1] < 0xa0);
-        if (size == 0 || control)
-            fputc('?', stream);
-        else
-            fwrite(text + i, 1, (size_t)size, stream);
+        const int control =
+            c < 0x20 || c == 0x7f || (size == 2 && c == 0xc2 && (unsigned char)text[i + 1] < 0xa0);
+        if (size == 0 || control) fputc('?', stream);
+        else fwrite(text + i, 1, (size_t)size, stream);
         i += size > 0 ? (size_t)size : 1;
     }
 }
@@ -92,7 +91,9 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
     char eps[32] = "targets", size[16];
     if (s[PLIANT_SUMMARY_EPS] != 0) snprintf(eps, sizeof eps, "%g", s[PLIANT_SUMMARY_EPS]);
     write_bytes(pliant_description_level_bytes(g), size);
-    fprintf(stream, "            %-11s  %5d  %7d  %9" PRIu64 "  %7s  %6.3gx  %7s  %7.2g  %7.2g  %s, %s, %s\n",
+    fprintf(stream,
+            "            %-11s  %5d  %7d  %9" PRIu64
+            "  %7s  %6.3gx  %7s  %7.2g  %7.2g  %s, %s, %s\n",
             pliant_block_text(block), (int)level, (int)g->column_count, g->nnz, size,
             s[PLIANT_SUMMARY_FACTOR], eps, s[PLIANT_SUMMARY_RMS], s[PLIANT_SUMMARY_MAX],
             s[PLIANT_SUMMARY_WAVELET] == PLIANT_BUTTERFLY ? "butterfly" : "linear",
@@ -102,8 +103,8 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
 
 static void print_greens(const pliant_model_view *v, FILE *stream)
 {
-    fprintf(stream, "%-12s%-11s  %5s  %7s  %9s  %7s  %7s  %7s  %7s  %7s  %s\n", "greens", "block", "level",
-            "columns", "stored", "size", "factor", "eps", "rms", "max", "wavelet");
+    fprintf(stream, "%-12s%-11s  %5s  %7s  %9s  %7s  %7s  %7s  %7s  %7s  %s\n", "greens", "block",
+            "level", "columns", "stored", "size", "factor", "eps", "rms", "max", "wavelet");
     for (pliant_block_name block = PLIANT_FREE_FREE; block < PLIANT_BLOCK_COUNT; block++)
         for (int32_t level = 0; level < v->level_count; level++)
             if (v->greens[block][level].column_offset)
@@ -115,7 +116,8 @@ static void print_dense(const pliant_dense_view *v, FILE *stream)
 {
     fprintf(stream, "nodes       %d free", (int)v->free_count);
     if (v->has_supports) fprintf(stream, ", %d fixed", (int)v->fixed_count);
-    fprintf(stream, "\nmatrices    free-free %d x %d", 3 * (int)v->free_count, 3 * (int)v->free_count);
+    fprintf(stream, "\nmatrices    free-free %d x %d", 3 * (int)v->free_count,
+            3 * (int)v->free_count);
     if (v->has_supports) fputs(", free-fixed, fixed-free, fixed-fixed", stream);
     fprintf(stream, "\ngravity     free%s\n", v->has_supports ? ", fixed" : "");
 }
@@ -126,7 +128,8 @@ static void print_sections(const pliant_reader *reader, FILE *stream)
         const pliant_section *s = pliant_reader_section(reader, i);
         fprintf(stream, "%-12s%s %s [", i == 0 ? "sections" : "", s->path,
                 pliant_section_type_text(s->type));
-        for (int32_t d = 0; d < s->rank; d++) fprintf(stream, "%s%" PRIu64, d ? ", " : "", s->shape[d]);
+        for (int32_t d = 0; d < s->rank; d++)
+            fprintf(stream, "%s%" PRIu64, d ? ", " : "", s->shape[d]);
         fputs("]\n", stream);
     }
 }

@@ -15,7 +15,7 @@ void pliant_description_print_json(const pliant_contents *contents, int verified
 typedef struct pliant_mesh_facts {
     double low[3], high[3];  // bounding box
     double volume;
-    int32_t source_count;    // vertices of the input mesh
+    int32_t source_count;  // vertices of the input mesh
 } pliant_mesh_facts;
 pliant_mesh_facts pliant_description_mesh(const pliant_model_view *view);
 

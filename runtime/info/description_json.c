@@ -15,14 +15,10 @@ static void print_string(const char *text, size_t length, FILE *stream)
     for (size_t i = 0; i < length;) {
         const int size = pliant_utf8_character(text + i, length - i);
         const unsigned char c = (unsigned char)text[i];
-        if (size == 0)
-            fputs("\\ufffd", stream);
-        else if (c == '"' || c == '\\')
-            fprintf(stream, "\\%c", c);
-        else if (c < 0x20 || c == 0x7f)
-            fprintf(stream, "\\u%04x", c);
-        else
-            fwrite(text + i, 1, (size_t)size, stream);
+        if (size == 0) fputs("\\ufffd", stream);
+        else if (c == '"' || c == '\\') fprintf(stream, "\\%c", c);
+        else if (c < 0x20 || c == 0x7f) fprintf(stream, "\\u%04x", c);
+        else fwrite(text + i, 1, (size_t)size, stream);
         i += size > 0 ? (size_t)size : 1;
     }
     fputc('"', stream);
@@ -31,10 +27,8 @@ static void print_string(const char *text, size_t length, FILE *stream)
 // JSON has no inf: sums of huge finite coordinates may be one.
 static void print_number(double value, FILE *stream)
 {
-    if (isfinite(value))
-        fprintf(stream, "%.17g", value);
-    else
-        fputs("null", stream);
+    if (isfinite(value)) fprintf(stream, "%.17g", value);
+    else fputs("null", stream);
 }
 
 static void print_vector(const double *x, FILE *stream)
@@ -49,7 +43,9 @@ static void print_vector(const double *x, FILE *stream)
 static void print_mesh(const pliant_model_view *v, FILE *stream)
 {
     const pliant_mesh_facts facts = pliant_description_mesh(v);
-    fprintf(stream, ",\n  \"mesh\": {\"vertices\": %d, \"faces\": %d, \"source_vertices\": %d,\n    \"levels\": [",
+    fprintf(stream,
+            ",\n  \"mesh\": {\"vertices\": %d, \"faces\": %d, \"source_vertices\": %d,\n    "
+            "\"levels\": [",
             (int)v->vertex_count, (int)v->face_count, (int)facts.source_count);
     for (int32_t l = 0; l < v->level_count; l++)
         fprintf(stream, "%s{\"vertices\": %d, \"faces\": %d}", l ? ", " : "",
@@ -113,7 +109,8 @@ static void print_greens(const pliant_model_view *v, FILE *stream)
 }
 
 // Was this key there before byte `end` of the text? An object has it once: the first wins.
-static int came_before(const pliant_contents *contents, const pliant_contents_pair *pair, size_t end)
+static int came_before(const pliant_contents *contents, const pliant_contents_pair *pair,
+                       size_t end)
 {
     pliant_contents_pair earlier;
     for (size_t at = 0; pliant_contents_next_pair(contents, &at, &earlier) && at < end;)
@@ -147,7 +144,8 @@ static void print_sections(const pliant_reader *reader, FILE *stream)
         fprintf(stream, "%s\n    {\"path\": ", i ? "," : "");
         print_string(s->path, strlen(s->path), stream);
         fprintf(stream, ", \"type\": \"%s\", \"shape\": [", pliant_section_type_text(s->type));
-        for (int32_t d = 0; d < s->rank; d++) fprintf(stream, "%s%" PRIu64, d ? ", " : "", s->shape[d]);
+        for (int32_t d = 0; d < s->rank; d++)
+            fprintf(stream, "%s%" PRIu64, d ? ", " : "", s->shape[d]);
         fprintf(stream, "], \"offset\": %" PRIu64 ", \"bytes\": %" PRIu64 ", \"crc32c\": \"%08x\"}",
                 s->offset, s->bytes, (unsigned)s->checksum);
     }

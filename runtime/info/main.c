@@ -26,21 +26,19 @@ static int run(const pliant_info_options *options)
     int status = EXIT_DONE;
     if (options->verify && pliant_contents_verify(&contents, &err) < 0) status = EXIT_FAILED;
     if (status == EXIT_DONE && options->output) {
-        const pliant_status done = pliant_mesh_export(&contents, options->output, options->level, &err);
+        const pliant_status done =
+            pliant_mesh_export(&contents, options->output, options->level, &err);
         if (done < 0) status = done == PLIANT_ERR_ARGUMENT ? EXIT_MISUSED : EXIT_FAILED;
     }
-    if (status != EXIT_DONE)
-        refuse(status, &err);
-    else if (options->json)
-        pliant_description_print_json(&contents, options->verify, stdout);
+    if (status != EXIT_DONE) refuse(status, &err);
+    else if (options->json) pliant_description_print_json(&contents, options->verify, stdout);
     else if (options->verify)
         printf("verified: %" PRId32 " sections, %" PRIu64 " bytes: checksums%s\n",
                pliant_reader_section_count(contents.reader), pliant_reader_size(contents.reader),
                contents.kind == PLIANT_CONTENTS_MODEL   ? ", indices and levels"
                : contents.kind == PLIANT_CONTENTS_DENSE ? " and indices"
                                                         : "");
-    else if (!options->output)
-        pliant_description_print(&contents, stdout);
+    else if (!options->output) pliant_description_print(&contents, stdout);
     pliant_contents_close(&contents);
     return status;
 }
@@ -51,7 +49,8 @@ static int finish(int status)
     const int failed = ferror(stdout);
     errno = 0;
     if ((fclose(stdout) == 0 && !failed) || status != EXIT_DONE) return status;
-    fprintf(stderr, "pliant-info: standard output: %s\n", errno ? strerror(errno) : "cannot be written");
+    fprintf(stderr, "pliant-info: standard output: %s\n",
+            errno ? strerror(errno) : "cannot be written");
     return EXIT_FAILED;
 }
 

@@ -63,15 +63,14 @@ static pliant_status write_file(const level_mesh *mesh, const char *path, const 
 {
     struct stat info;
     if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
-        return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: expected a file to replace, found something else",
-                                path);
+        return pliant_error_set(err, PLIANT_ERR_IO,
+                                "%.400s: expected a file to replace, found something else", path);
     errno = 0;
     FILE *file = fopen(temporary, "wbe");
-    if (!file) return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: %s", temporary, strerror(errno));
-    if (pliant_mesh_export_format(path) == PLIANT_MESH_OBJ)
-        write_obj(mesh, file);
-    else
-        write_ply(mesh, file);
+    if (!file)
+        return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: %s", temporary, strerror(errno));
+    if (pliant_mesh_export_format(path) == PLIANT_MESH_OBJ) write_obj(mesh, file);
+    else write_ply(mesh, file);
     int failed = fflush(file) != 0 || ferror(file) || fsync(fileno(file)) != 0;
     int error = errno;
     if (fclose(file) != 0 && !failed) failed = 1, error = errno;
@@ -87,12 +86,14 @@ pliant_status pliant_mesh_export(const pliant_contents *contents, const char *pa
     const pliant_model_view *v = &contents->model;
     const char *name = pliant_reader_name(contents->reader);
     if (contents->kind != PLIANT_CONTENTS_MODEL)
-        return pliant_error_set(err, PLIANT_ERR_MISSING, "%.400s: expected a model to export, found a %s file",
-                                name, pliant_contents_kind_text(contents->kind));
+        return pliant_error_set(err, PLIANT_ERR_MISSING,
+                                "%.400s: expected a model to export, found a %s file", name,
+                                pliant_contents_kind_text(contents->kind));
     if (level < 0) level = v->level_count - 1;
     if (level >= v->level_count)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.400s: --level: expected 0 to %d, found %d",
-                                name, (int)v->level_count - 1, (int)level);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "%.400s: --level: expected 0 to %d, found %d", name,
+                                (int)v->level_count - 1, (int)level);
     pliant_hierarchy *hierarchy = NULL;
     pliant_status status = pliant_contents_hierarchy(contents, &hierarchy, err);
     if (status < 0) return status;
@@ -108,7 +109,8 @@ pliant_status pliant_mesh_export(const pliant_contents *contents, const char *pa
         strcat(temporary, ".tmp");
         status = write_file(&mesh, path, temporary, err);
     } else {
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "%.400s: expected memory, found none", path);
+        status =
+            pliant_error_set(err, PLIANT_ERR_MEMORY, "%.400s: expected memory, found none", path);
     }
     free(temporary);
     pliant_hierarchy_destroy(hierarchy);

@@ -14,13 +14,16 @@ const char *pliant_info_options_help(void)
 {
     return "usage: pliant-info [options] FILE.h5\n"
            "\n"
-           "Show what a model file of pliant-precompute holds: mesh, levels, domains, material, blocks\n"
-           "of Green's functions with their size and error, provenance. Dense files and recordings\n"
+           "Show what a model file of pliant-precompute holds: mesh, levels, domains, material, "
+           "blocks\n"
+           "of Green's functions with their size and error, provenance. Dense files and "
+           "recordings\n"
            "of pliant-play are shown, too.\n"
            "\n"
            "  --verify            check every checksum and index, and the mesh's levels\n"
            "  --export FILE       write the model's mesh; FILE ends in .obj or .ply\n"
-           "  --level L           with --export: the mesh of level L, 0 the coarsest (default: finest)\n"
+           "  --level L           with --export: the mesh of level L, 0 the coarsest (default: "
+           "finest)\n"
            "  --json              the same as JSON\n"
            "  -h, --help          this text\n"
            "  --version           the program's version\n"
@@ -46,8 +49,9 @@ static pliant_status parse_level(const char *text, int32_t *level, pliant_error 
     errno = 0;
     const long value = strtol(text, &end, 10);
     if (end == text || *end != 0 || errno != 0 || value < 0 || value > PLIANT_LEVEL_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--level: expected 0 to %d, found \"%.100s\"",
-                                PLIANT_LEVEL_LIMIT, text);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--level: expected 0 to %d, found \"%.100s\"", PLIANT_LEVEL_LIMIT,
+                                text);
     *level = (int32_t)value;
     return PLIANT_OK;
 }
@@ -61,20 +65,33 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
     optind = 1;
     for (int c; status == PLIANT_OK && (c = getopt_long(argc, argv, ":h", known, NULL)) != -1;) {
         switch (c) {
-        case 'h': o.help = 1; break;
-        case OPTION_VERSION: o.version = 1; break;
-        case OPTION_VERIFY: o.verify = 1; break;
-        case OPTION_EXPORT: o.output = optarg; break;
-        case OPTION_LEVEL: status = parse_level(optarg, &o.level, err); break;
-        case OPTION_JSON: o.json = 1; break;
+        case 'h':
+            o.help = 1;
+            break;
+        case OPTION_VERSION:
+            o.version = 1;
+            break;
+        case OPTION_VERIFY:
+            o.verify = 1;
+            break;
+        case OPTION_EXPORT:
+            o.output = optarg;
+            break;
+        case OPTION_LEVEL:
+            status = parse_level(optarg, &o.level, err);
+            break;
+        case OPTION_JSON:
+            o.json = 1;
+            break;
         case ':':
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.100s: expected a value, found none",
-                                    argv[optind - 1]);
+            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                    "%.100s: expected a value, found none", argv[optind - 1]);
         default:
             // getopt leaves the letter in optopt, or 0 for a long option.
             if (optopt > 0 && optopt < 256)
                 return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "-%c: unknown option", optopt);
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.100s: unknown, ambiguous or with a value it does not take",
+            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                    "%.100s: unknown, ambiguous or with a value it does not take",
                                     argv[optind - 1]);
         }
         if (o.help || o.version) {
@@ -84,14 +101,16 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
     }
     if (status < 0) return status;
     if (argc - optind != 1)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected one file, found %d", argc - optind);
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected one file, found %d",
+                                argc - optind);
     o.path = argv[optind];
     if (o.level >= 0 && !o.output)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--level: expected --export with it, found none");
-    if (o.output && pliant_mesh_export_format(o.output) == PLIANT_MESH_UNKNOWN)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "--export: expected a name that ends in .obj or .ply, found \"%.300s\"",
-                                o.output);
+                                "--level: expected --export with it, found none");
+    if (o.output && pliant_mesh_export_format(o.output) == PLIANT_MESH_UNKNOWN)
+        return pliant_error_set(
+            err, PLIANT_ERR_ARGUMENT,
+            "--export: expected a name that ends in .obj or .ply, found \"%.300s\"", o.output);
     *options = o;
     return PLIANT_OK;
 }

@@ -4,11 +4,11 @@
 #include "pliant/base.h"
 
 typedef struct pliant_info_options {
-    const char *path;      // the file to look at; borrowed from argv, as the next
-    const char *output;    // --export; NULL: none
-    int32_t level;         // --level; -1: the finest
-    int32_t verify, json;  // 1: asked for
-    int32_t help, version; // 1: asked for; nothing else is checked
+    const char *path;       // the file to look at; borrowed from argv, as the next
+    const char *output;     // --export; NULL: none
+    int32_t level;          // --level; -1: the finest
+    int32_t verify, json;   // 1: asked for
+    int32_t help, version;  // 1: asked for; nothing else is checked
 } pliant_info_options;
 
 // Refusals name the option, what was expected and what was found. argv is permuted.

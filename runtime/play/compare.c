@@ -43,8 +43,8 @@ struct pliant_compare {
     size_t matrix_capacity;  // 3s that the three above have room for
     int solved;              // 1: u and force belong to conditions and gravity
 
-    double *free_u;      // [3m]
-    double *u;           // [3n]
+    double *free_u;  // [3m]
+    double *u;       // [3n]
     double force[3];
 
     // Gathered columns, free rows: three columns [3m] each per place, replaced in turn.
@@ -343,10 +343,8 @@ static void evaluate(pliant_compare *c)
     for (int32_t j = 0; j < c->condition_count; j++) {
         const pliant_condition *condition = &c->conditions[j];
         const int32_t vertex = condition->node.vertex;
-        if (j < c->changed_count)
-            memcpy(value, c->right + 3 * (size_t)j, sizeof value);
-        else
-            unpack(condition->value, value);
+        if (j < c->changed_count) memcpy(value, c->right + 3 * (size_t)j, sizeof value);
+        else unpack(condition->value, value);
         const double *column = gather(c, vertex);
         for (int k = 0; k < 3; k++)
             for (size_t row = 0; row < m3; row++)

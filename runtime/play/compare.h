@@ -15,9 +15,9 @@ typedef struct pliant_compare pliant_compare;
 // exact answer is zero counts 0 when the played one is zero too, else infinity.
 typedef struct pliant_compare_summary {
     int64_t step_count;
-    double rms;                                 // over the vertices of all steps together
+    double rms;  // over the vertices of all steps together
     double rms_worst, max_worst, force_worst;
-    int64_t rms_step, max_step, force_step;     // where the worst stood, 0 without a step
+    int64_t rms_step, max_step, force_step;  // where the worst stood, 0 without a step
 } pliant_compare_summary;
 
 // Map a dense file and check that its nodes are the model's. `model` is borrowed until close.

@@ -16,11 +16,11 @@ typedef struct member {
     const pliant_observer *observer;  // told about the first pass; may be NULL
     pliant_player *player;            // of the first pass
     pliant_timings *timings, *warm_up;
-    pliant_timings *current;          // where this pass is counted
+    pliant_timings *current;  // where this pass is counted
     int64_t step_count;
-    int is_observed;                  // 1: during the observed pass
-    atomic_int *stop;                 // shared: 1 once a member has failed
-    int was_stopped;                  // 1: by another's failure
+    int is_observed;   // 1: during the observed pass
+    atomic_int *stop;  // shared: 1 once a member has failed
+    int was_stopped;   // 1: by another's failure
     pthread_t thread;
     pliant_status status;
     pliant_error err;
@@ -87,10 +87,8 @@ static void *play_all(void *context)
         m->current = m->def->repeat > 1 && pass == 0 ? m->warm_up : m->timings;
         m->is_observed = m->observer && pass == 0;
         m->status = play_pass(m, &player);
-        if (pass == 0)
-            m->player = player;
-        else
-            pliant_player_destroy(player);
+        if (pass == 0) m->player = player;
+        else pliant_player_destroy(player);
     }
     if (m->status < 0) atomic_store_explicit(m->stop, 1, memory_order_relaxed);
     return NULL;
@@ -115,10 +113,8 @@ static pliant_status run(member *members, int32_t count, pliant_error *err)
                                       (int)started + 1, (int)count);
             break;
         }
-    if (status >= 0)
-        play_all(&members[0]);
-    else
-        atomic_store_explicit(members[0].stop, 1, memory_order_relaxed);
+    if (status >= 0) play_all(&members[0]);
+    else atomic_store_explicit(members[0].stop, 1, memory_order_relaxed);
     for (int32_t i = 0; i < started; i++) pthread_join(members[i + 1].thread, NULL);
     for (int32_t i = 0; status >= 0 && i < count; i++)
         if (members[i].status < 0 && !members[i].was_stopped) {

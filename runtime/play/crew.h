@@ -19,11 +19,11 @@ typedef struct pliant_crew_def {
 } pliant_crew_def;
 
 typedef struct pliant_crew_result {
-    pliant_player *player;   // the first, as its first pass left it; owned, destroy it
-    pliant_timings *timings; // of all that is not warm-up; owned
-    pliant_timings *warm_up; // empty with one pass; owned
-    int64_t step_count;      // of all players and passes, warm-up included
-    double seconds;          // wall time of the above, output included
+    pliant_player *player;    // the first, as its first pass left it; owned, destroy it
+    pliant_timings *timings;  // of all that is not warm-up; owned
+    pliant_timings *warm_up;  // empty with one pass; owned
+    int64_t step_count;       // of all players and passes, warm-up included
+    double seconds;           // wall time of the above, output included
 } pliant_crew_result;
 
 // On refusal `result` still holds the first player when there is one.

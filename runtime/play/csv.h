@@ -1,6 +1,7 @@
 // csv.h: one row of comma-separated values per step.
 //
-//     step,time,solve_us,constraints,level,<probe>.x,<probe>.y,<probe>.z,...,force.x,force.y,force.z
+//     step,time,solve_us,constraints,level,<probe>.x,<probe>.y,<probe>.z,...,
+//     force.x,force.y,force.z
 //
 // solve_us is the whole step: from the state to the reconstructed surface.
 #pragma once

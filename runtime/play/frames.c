@@ -54,10 +54,10 @@ typedef struct step_head {
 
 struct pliant_frames {
     char *path;
-    int spool;             // file descriptor, unlinked
+    int spool;  // file descriptor, unlinked
     uint64_t step_count;
     uint64_t vertex_count;
-    size_t record_size;    // bytes of one step in the spool
+    size_t record_size;  // bytes of one step in the spool
     char *record;
 };
 
@@ -138,9 +138,9 @@ pliant_status pliant_frames_add(pliant_frames *frames, const pliant_player *play
 static pliant_status read_record(pliant_frames *frames, uint64_t step, pliant_error *err)
 {
     for (size_t done = 0; done < frames->record_size;) {
-        const ssize_t count = pread(frames->spool, frames->record + done,
-                                    frames->record_size - done,
-                                    (off_t)(step * frames->record_size + done));
+        const ssize_t count =
+            pread(frames->spool, frames->record + done, frames->record_size - done,
+                  (off_t)(step * frames->record_size + done));
         if (count < 0 && errno == EINTR) continue;
         if (count <= 0)
             return pliant_error_set(err, PLIANT_ERR_IO, "%s: reading the spool back: %s",
@@ -158,8 +158,8 @@ typedef struct batch {
     char *displacement;
 } batch;
 
-static pliant_status write_batch(pliant_writer *writer, const pliant_frames *frames,
-                                 const batch *b, uint64_t first, uint64_t count, pliant_error *err)
+static pliant_status write_batch(pliant_writer *writer, const pliant_frames *frames, const batch *b,
+                                 uint64_t first, uint64_t count, pliant_error *err)
 {
     const uint64_t start[3] = {first, 0, 0};
     const uint64_t extent[3] = {count, frames->vertex_count, 3};
@@ -223,10 +223,8 @@ pliant_status pliant_frames_commit(pliant_frames *frames, pliant_error *err)
         frames->path, sections, (int32_t)(sizeof sections / sizeof *sections), &writer, err);
     if (status >= 0) {
         status = copy_spool(frames, writer, err);
-        if (status >= 0)
-            status = pliant_writer_commit(writer, err);
-        else
-            pliant_writer_abandon(writer);
+        if (status >= 0) status = pliant_writer_commit(writer, err);
+        else pliant_writer_abandon(writer);
     }
     destroy(frames);
     return status;

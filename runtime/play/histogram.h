@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-#define PLIANT_HISTOGRAM_PARTS        128  // per power of two
+#define PLIANT_HISTOGRAM_PARTS        128                            // per power of two
 #define PLIANT_HISTOGRAM_BUCKET_COUNT (57 * PLIANT_HISTOGRAM_PARTS)  // up to INT64_MAX
 
 typedef struct pliant_histogram {

@@ -39,15 +39,11 @@ static void warn_of_rough(const pliant_crew_result *result)
 // The table, or the JSON object; after standard input only what was not said line by line.
 static void write_end(const pliant_play_options *options, const pliant_report *report)
 {
-    if (options->json)
-        pliant_report_write_json(report, stdout);
+    if (options->json) pliant_report_write_json(report, stdout);
     else if (strcmp(options->script, "-") != 0) {
-        if (!options->quiet)
-            pliant_report_write(report, stdout);
-        else if (report->compare)
-            pliant_report_write_compare(report->compare, stdout);
-    } else if (report->compare)
-        pliant_report_write_compare(report->compare, stdout);
+        if (!options->quiet) pliant_report_write(report, stdout);
+        else if (report->compare) pliant_report_write_compare(report->compare, stdout);
+    } else if (report->compare) pliant_report_write_compare(report->compare, stdout);
 }
 
 static pliant_status play(const pliant_play_options *options, const pliant_model *model,
@@ -65,7 +61,8 @@ static pliant_status play(const pliant_play_options *options, const pliant_model
     };
     def.player.script_name = is_streaming ? "standard input" : options->script;
     def.player.level = level;
-    if (options->csv || (options->json && is_streaming)) def.player.probe_rule = PLIANT_PROBES_FIRST;
+    if (options->csv || (options->json && is_streaming))
+        def.player.probe_rule = PLIANT_PROBES_FIRST;
 
     pliant_crew_result result;
     pliant_status status = pliant_crew_play(model, &def, &result, err);
@@ -110,10 +107,8 @@ static int run(const pliant_play_options *options)
     if (status >= 0) status = pliant_outputs_open(options, model, level, &outputs, &err);
     if (status >= 0) status = play(options, model, level, outputs, &err);
     pipe_closed = outputs && pliant_outputs_pipe_closed(outputs);
-    if (status < 0)
-        exit_status = pipe_closed ? FAILED : complain(&err, FAILED);
-    else if (pliant_outputs_refused_count(outputs) > 0)
-        exit_status = FAILED;
+    if (status < 0) exit_status = pipe_closed ? FAILED : complain(&err, FAILED);
+    else if (pliant_outputs_refused_count(outputs) > 0) exit_status = FAILED;
 
 done:
     pliant_outputs_destroy(outputs);
@@ -128,7 +123,8 @@ done:
 
 int main(int argc, char **argv)
 {
-    // A closed pipe and a file-size limit come back as errors of write, so that outputs are cleaned.
+    // A closed pipe and a file-size limit come back as errors of write, so that outputs are
+    // cleaned.
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
     pliant_error err;
@@ -137,9 +133,12 @@ int main(int argc, char **argv)
     if (pliant_play_options_parse(argc, argv, &options, &request, &err) < 0)
         return complain(&err, MISUSED);
     switch (request) {
-    case PLIANT_PLAY_HELP: return print(pliant_play_help);
-    case PLIANT_PLAY_VERSION: return print("pliant-play " PLIANT_VERSION_TEXT "\n");
-    case PLIANT_PLAY_RUN: break;
+    case PLIANT_PLAY_HELP:
+        return print(pliant_play_help);
+    case PLIANT_PLAY_VERSION:
+        return print("pliant-play " PLIANT_VERSION_TEXT "\n");
+    case PLIANT_PLAY_RUN:
+        break;
     }
     return run(&options);
 }

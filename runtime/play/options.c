@@ -135,7 +135,8 @@ static pliant_status parse_path(const char *option, const char *text, const char
     return PLIANT_OK;
 }
 
-// What getopt did not like: an option that is unknown, ambiguous, or has a value too many or too few.
+// What getopt did not like: an option that is unknown, ambiguous, or has a value too many or too
+// few.
 static pliant_status refuse_option(int found, int argc, char **argv, pliant_error *err)
 {
     const char *text = optind > 0 && optind <= argc ? argv[optind - 1] : "";
@@ -144,8 +145,8 @@ static pliant_status refuse_option(int found, int argc, char **argv, pliant_erro
                                 text);
     for (const struct option *o = long_options; optopt && o->name; o++)
         if (o->val == optopt && o->has_arg == no_argument)
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s: expected no value, found %.60s",
-                                    o->name, text);
+            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                    "--%s: expected no value, found %.60s", o->name, text);
     if (optopt > 0 && optopt < 256)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "-%c: unknown option; see --help",
                                 optopt);
@@ -155,7 +156,8 @@ static pliant_status refuse_option(int found, int argc, char **argv, pliant_erro
 static pliant_status parse_option(int found, pliant_play_options *o, pliant_error *err)
 {
     switch (found) {
-    case 'o': return parse_path("-o", optarg, &o->csv, err);
+    case 'o':
+        return parse_path("-o", optarg, &o->csv, err);
     case OPTION_FRAMES:
 #ifdef PLIANT_WITHOUT_HDF5
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
@@ -163,19 +165,31 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
 #else
         return parse_path("--frames", optarg, &o->frames, err);
 #endif
-    case OPTION_VTK: return parse_path("--vtk", optarg, &o->vtk, err);
-    case OPTION_FORCE: o->force = 1; return PLIANT_OK;
+    case OPTION_VTK:
+        return parse_path("--vtk", optarg, &o->vtk, err);
+    case OPTION_FORCE:
+        o->force = 1;
+        return PLIANT_OK;
     case OPTION_LOD:
         // How many levels there are, the model will say.
         return parse_count("--lod", optarg, 0, INT32_MAX, &o->level, err);
-    case OPTION_REPEAT: return parse_count("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
+    case OPTION_REPEAT:
+        return parse_count("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
     case OPTION_THREADS:
         return parse_count("--threads", optarg, 1, PLIANT_CREW_LIMIT, &o->threads, err);
-    case OPTION_COMPARE: return parse_path("--compare", optarg, &o->compare, err);
-    case OPTION_JSON: o->json = 1; return PLIANT_OK;
-    case OPTION_NO_VERIFY: o->verify = 0; return PLIANT_OK;
-    case 'q': o->quiet = 1; return PLIANT_OK;
-    default: return PLIANT_ERR_ARGUMENT;
+    case OPTION_COMPARE:
+        return parse_path("--compare", optarg, &o->compare, err);
+    case OPTION_JSON:
+        o->json = 1;
+        return PLIANT_OK;
+    case OPTION_NO_VERIFY:
+        o->verify = 0;
+        return PLIANT_OK;
+    case 'q':
+        o->quiet = 1;
+        return PLIANT_OK;
+    default:
+        return PLIANT_ERR_ARGUMENT;
     }
 }
 

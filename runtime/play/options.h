@@ -5,9 +5,9 @@
 
 typedef struct pliant_play_options {
     const char *model;
-    const char *script;   // "-": standard input
+    const char *script;                        // "-": standard input
     const char *csv, *frames, *vtk, *compare;  // NULL: not asked for
-    int32_t level;        // of --lod, -1: all
+    int32_t level;                             // of --lod, -1: all
     int32_t repeat, threads;
     int force, quiet, json, verify;
 } pliant_play_options;  // strings are argv's

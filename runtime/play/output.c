@@ -13,7 +13,7 @@ enum { BUFFER_SIZE = 1 << 16 };  // bytes: several hundred rows per system call
 
 struct pliant_output {
     FILE *stream;
-    int renamed;   // 1: written under a temporary name
+    int renamed;  // 1: written under a temporary name
     char *path, *temporary;
     char buffer[BUFFER_SIZE];
 };

@@ -18,20 +18,20 @@ struct pliant_outputs {
     const pliant_play_options *options;
     const pliant_model *model;
     int32_t level;
-    int is_streaming;   // 1: answer standard input line by line
-    int is_typed;       // 1: by a person
+    int is_streaming;  // 1: answer standard input line by line
+    int is_typed;      // 1: by a person
     int pipe_closed;
     int64_t refused_count;
-    pliant_csv *csv;            // these are NULL when not asked for
+    pliant_csv *csv;  // these are NULL when not asked for
     pliant_frames *frames;
     pliant_vtk_series *vtk;
     pliant_compare *compare;
     pliant_compare_summary compared;
     // Where tractions are known, for vtk: all vertices with supports, else the free ones.
-    int32_t *traction_vertex;   // [traction_count]; NULL: vertices 0 .. traction_count-1
+    int32_t *traction_vertex;  // [traction_count]; NULL: vertices 0 .. traction_count-1
     int32_t traction_count;
-    pliant_vec3 *known;         // [traction_count]
-    pliant_vec3 *traction;      // [surface vertices]
+    pliant_vec3 *known;     // [traction_count]
+    pliant_vec3 *traction;  // [surface vertices]
 };
 
 // ---- Life ----
@@ -142,7 +142,8 @@ static pliant_status add_vtk(pliant_outputs *o, pliant_player *player, const pli
     if (status < 0)
         return pliant_error_set(err, status, "%s: tractions of step %lld: %s", o->options->vtk,
                                 (long long)step->number, pliant_status_name(status));
-    for (int32_t i = 0; i < o->traction_count; i++) o->traction[o->traction_vertex[i]] = o->known[i];
+    for (int32_t i = 0; i < o->traction_count; i++)
+        o->traction[o->traction_vertex[i]] = o->known[i];
     return pliant_vtk_series_add(o->vtk, step->time, pliant_player_surface(player), o->traction,
                                  err);
 }
@@ -157,12 +158,9 @@ static pliant_status stepped(void *context, pliant_player *player, const pliant_
     if (status >= 0 && o->vtk) status = add_vtk(o, player, step, err);
     if (status >= 0 && o->compare) status = pliant_compare_add(o->compare, player, err);
     if (status < 0 || !o->is_streaming) return status;
-    if (o->options->json)
-        pliant_report_write_step_json(player, step, stdout);
-    else if (!o->options->quiet)
-        pliant_report_write_step(player, step, stdout);
-    else
-        return PLIANT_OK;
+    if (o->options->json) pliant_report_write_step_json(player, step, stdout);
+    else if (!o->options->quiet) pliant_report_write_step(player, step, stdout);
+    else return PLIANT_OK;
     return pliant_outputs_flush(o, err);
 }
 
@@ -171,12 +169,9 @@ static pliant_status expected(void *context, const pliant_expectation *expectati
 {
     pliant_outputs *o = context;
     if (!o->is_streaming) return PLIANT_OK;
-    if (o->options->json)
-        pliant_report_write_expectation_json(expectation, stdout);
-    else if (!o->options->quiet)
-        pliant_report_write_expectation(expectation, stdout);
-    else
-        return PLIANT_OK;
+    if (o->options->json) pliant_report_write_expectation_json(expectation, stdout);
+    else if (!o->options->quiet) pliant_report_write_expectation(expectation, stdout);
+    else return PLIANT_OK;
     return pliant_outputs_flush(o, err);
 }
 

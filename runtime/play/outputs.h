@@ -14,7 +14,8 @@ PLIANT_UNUSED_RESULT pliant_status pliant_outputs_open(const pliant_play_options
                                                        pliant_outputs **outputs, pliant_error *err);
 // Hand this to the players. Its refused() tells and goes on when a person types.
 pliant_observer pliant_outputs_observer(pliant_outputs *outputs);
-int64_t pliant_outputs_refused_count(const pliant_outputs *outputs);  // statements told and passed over
+int64_t
+pliant_outputs_refused_count(const pliant_outputs *outputs);    // statements told and passed over
 int pliant_outputs_pipe_closed(const pliant_outputs *outputs);  // 1: nobody reads standard output
 // NULL without --compare, or before the first step.
 const pliant_compare_summary *pliant_outputs_compared(pliant_outputs *outputs);

@@ -2,7 +2,6 @@
 #include "player.h"
 
 #include "pliant/error.h"
-#include "pliant/hierarchy.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -22,18 +21,14 @@ struct pliant_player {
     pliant_vec3 *surface;  // [surface_count]
     int32_t surface_count;
 
-    // Integral of the basis function of vertex v on level l over its domain, at node_offset[l] + v, m^2.
-    double *hat_area;
-    size_t node_offset[PLIANT_LEVEL_LIMIT + 2];
-
     pliant_probe *probes;
     int32_t probe_count;
     int32_t *probe_vertex;  // [probe_count]
     pliant_vec3 *probe_u;   // [probe_count]
 
-    double dt;           // s
-    double time_start;   // time when dt last changed, s
-    int64_t dt_steps;    // steps since
+    double dt;          // s
+    double time_start;  // time when dt last changed, s
+    int64_t dt_steps;   // steps since
     pliant_step last;
 };
 
@@ -57,13 +52,20 @@ refuse(const pliant_player *player, const pliant_statement *statement, pliant_er
 static const char *verb_of(pliant_statement_kind kind)
 {
     switch (kind) {
-    case PLIANT_STATEMENT_DISPLACE: return "displace";
-    case PLIANT_STATEMENT_TRACTION: return "traction";
-    case PLIANT_STATEMENT_FORCE: return "force";
-    case PLIANT_STATEMENT_SUPPORT: return "support";
-    case PLIANT_STATEMENT_GRAVITY: return "gravity";
-    case PLIANT_STATEMENT_RELEASE: return "release";
-    default: return "statement";
+    case PLIANT_STATEMENT_DISPLACE:
+        return "displace";
+    case PLIANT_STATEMENT_TRACTION:
+        return "traction";
+    case PLIANT_STATEMENT_FORCE:
+        return "force";
+    case PLIANT_STATEMENT_SUPPORT:
+        return "support";
+    case PLIANT_STATEMENT_GRAVITY:
+        return "gravity";
+    case PLIANT_STATEMENT_RELEASE:
+        return "release";
+    default:
+        return "statement";
     }
 }
 
@@ -89,7 +91,8 @@ static pliant_status explain(const pliant_player *player, const pliant_statement
                       "%s: no more nodes can be changed than the model's %d", verb,
                       (int)player->info.vertex_count);
     case PLIANT_ERR_MEMORY:
-        return refuse(player, statement, err, status, "%s: no memory for one more changed node", verb);
+        return refuse(player, statement, err, status, "%s: no memory for one more changed node",
+                      verb);
     default:
         return refuse(player, statement, err, status, "%s refused for vertex %d: %s", verb,
                       (int)node.vertex, pliant_status_name(status));
@@ -97,37 +100,6 @@ static pliant_status explain(const pliant_player *player, const pliant_statement
 }
 
 // ---- Life ----
-
-// Hat areas of every level, fine to coarse (GF-53): the hat of k on level l holds its finer hat and
-// half the hats of the odd vertices next to it,
-//   I_k(l) = I_k(l+1) + 1/2 sum of I_m(l+1), m odd beside k and in k's domain.
-// The odd vertices on an edge are seen once from each of its two faces, hence the quarter.
-static void measure_hats(pliant_player *player)
-{
-    const pliant_model *model = player->model;
-    for (int32_t v = 0; v < player->info.vertex_count; v++)
-        player->hat_area[player->node_offset[player->finest] + (size_t)v] =
-            pliant_model_area(model, v);
-    for (int32_t l = player->finest - 1; l >= 0; l--) {
-        const int32_t *coarse = pliant_model_faces(model, l);
-        const int32_t *fine = pliant_model_faces(model, l + 1);
-        double *area = player->hat_area + player->node_offset[l];
-        const double *fine_area = player->hat_area + player->node_offset[l + 1];
-        memcpy(area, fine_area,
-               (size_t)pliant_model_level_vertex_count(model, l) * sizeof *area);
-        const int32_t face_count = pliant_model_level_face_count(model, l);
-        for (int32_t f = 0; f < face_count; f++) {
-            const int32_t *corner = coarse + 3 * (size_t)f;
-            const int32_t *odd = fine + 3 * (4 * (size_t)f + 3);  // (ab, bc, ca)
-            for (int e = 0; e < 3; e++)
-                for (int end = 0; end < 2; end++) {
-                    const int32_t k = corner[(e + end) % 3];
-                    if (pliant_model_is_free(model, k) == pliant_model_is_free(model, odd[e]))
-                        area[k] += fine_area[odd[e]] / 4;
-                }
-        }
-    }
-}
 
 pliant_player_def pliant_player_default(const pliant_model *model)
 {
@@ -153,15 +125,9 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
     p->finest = info.level_count - 1;
     p->dt = default_dt;
     p->surface_count = pliant_model_level_vertex_count(model, def->level);
-    for (int32_t l = 0; l < info.level_count; l++)
-        p->node_offset[l + 1] =
-            p->node_offset[l] + (size_t)pliant_model_level_vertex_count(model, l);
-    const size_t node_count = p->node_offset[info.level_count];
-
     pliant_status status = PLIANT_OK;
     p->surface = calloc((size_t)p->surface_count + 1, sizeof *p->surface);
-    p->hat_area = calloc(node_count, sizeof *p->hat_area);
-    if (!p->surface || !p->hat_area)
+    if (!p->surface)
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player of %d vertices",
                                   (int)info.vertex_count);
     if (status == PLIANT_OK) status = pliant_conditions_create(model, &p->conditions, err);
@@ -169,7 +135,6 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
         pliant_player_destroy(p);
         return status;
     }
-    measure_hats(p);
     *player = p;
     return PLIANT_OK;
 }
@@ -181,7 +146,6 @@ void pliant_player_destroy(pliant_player *player)
     free(player->probe_u);
     free(player->probe_vertex);
     free(player->probes);
-    free(player->hat_area);
     free(player->surface);
     free(player);
 }
@@ -202,13 +166,14 @@ static pliant_status resolve(const pliant_player *player, const pliant_statement
         return PLIANT_OK;
     case PLIANT_VERTEX_LEVEL:
         if (name->level < 0 || name->level > player->finest)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "level %d: expected 0 to %d", (int)name->level, (int)player->finest);
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "level %d: expected 0 to %d",
+                          (int)name->level, (int)player->finest);
         node->level = name->level;
         const int32_t count = pliant_model_level_vertex_count(player->model, name->level);
         if (name->number < 0 || name->number >= count)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "vertex %d of %d on level %d",
-                          (int)name->number, (int)count, (int)name->level);
+            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                          "vertex %d of %d on level %d", (int)name->number, (int)count,
+                          (int)name->level);
         return PLIANT_OK;
     case PLIANT_VERTEX_SOURCE:
         node->vertex = pliant_model_from_source(player->model, name->number);
@@ -269,10 +234,10 @@ static pliant_status execute_condition(pliant_player *player, const pliant_state
         condition.kind = PLIANT_CONDITION_SUPPORTED;
         break;
     case PLIANT_STATEMENT_FORCE:
-        // f_i = a_i p_i (GF-4), with the area of the hat that carries it.
-        scale = 1 / player->hat_area[player->node_offset[condition.node.level] + (size_t)vertex];
+        scale = 1 / pliant_model_area(player->model, vertex);  // f_i = a_i p_i (GF-4)
         break;
-    default: break;
+    default:
+        break;
     }
     status = value_of(player, statement, scale, &condition.value, err);
     if (status < 0) return status;
@@ -440,8 +405,7 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
     const pliant_status solved = pliant_conditions_solve(player->conditions);
     pliant_solver *solver = pliant_conditions_solver(player->conditions);
     pliant_status status = solved;
-    if (solved >= 0)
-        status = pliant_solver_surface(solver, player->def.level, player->surface);
+    if (solved >= 0) status = pliant_solver_surface(solver, player->def.level, player->surface);
     const int64_t end = now_ns();
     if (status < 0)
         return refuse(player, statement, err, status, "step %lld with %d constraints: %s",
@@ -482,18 +446,27 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
                                     const pliant_observer *observer, pliant_error *err)
 {
     switch (statement->kind) {
-    case PLIANT_STATEMENT_NONE: return PLIANT_OK;
-    case PLIANT_STATEMENT_VERSION: return PLIANT_OK;  // the parser accepts what it knows
-    case PLIANT_STATEMENT_PROBE: return execute_probe(player, statement, err);
+    case PLIANT_STATEMENT_NONE:
+        return PLIANT_OK;
+    case PLIANT_STATEMENT_VERSION:
+        return PLIANT_OK;  // the parser accepts what it knows
+    case PLIANT_STATEMENT_PROBE:
+        return execute_probe(player, statement, err);
     case PLIANT_STATEMENT_DISPLACE:
     case PLIANT_STATEMENT_TRACTION:
     case PLIANT_STATEMENT_FORCE:
-    case PLIANT_STATEMENT_SUPPORT: return execute_condition(player, statement, err);
-    case PLIANT_STATEMENT_GRAVITY: return execute_gravity(player, statement, err);
-    case PLIANT_STATEMENT_RELEASE: return execute_release(player, statement, err);
-    case PLIANT_STATEMENT_DT: return execute_dt(player, statement, err);
-    case PLIANT_STATEMENT_STEP: return execute_step(player, statement, observer, err);
-    case PLIANT_STATEMENT_EXPECT: return execute_expect(player, statement, observer, err);
+    case PLIANT_STATEMENT_SUPPORT:
+        return execute_condition(player, statement, err);
+    case PLIANT_STATEMENT_GRAVITY:
+        return execute_gravity(player, statement, err);
+    case PLIANT_STATEMENT_RELEASE:
+        return execute_release(player, statement, err);
+    case PLIANT_STATEMENT_DT:
+        return execute_dt(player, statement, err);
+    case PLIANT_STATEMENT_STEP:
+        return execute_step(player, statement, observer, err);
+    case PLIANT_STATEMENT_EXPECT:
+        return execute_expect(player, statement, observer, err);
     }
     return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "unknown statement");
 }

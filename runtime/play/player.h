@@ -30,18 +30,18 @@ typedef struct pliant_player_def {
 typedef struct pliant_probe {
     char name[PLIANT_SCRIPT_NAME_LIMIT];
     int32_t vertex;
-    int64_t step;    // the step that `u` belongs to, 0 before any
-    pliant_vec3 u;   // displacement, m
+    int64_t step;   // the step that `u` belongs to, 0 before any
+    pliant_vec3 u;  // displacement, m
 } pliant_probe;
 
 // What one step did.
 typedef struct pliant_step {
-    int64_t number;         // 1 is the first
-    double time;            // s, at the end of the step
-    pliant_status status;   // of the solve: PLIANT_OK or a reduced result
-    int64_t total_ns;       // solve and surface together
+    int64_t number;        // 1 is the first
+    double time;           // s, at the end of the step
+    pliant_status status;  // of the solve: PLIANT_OK or a reduced result
+    int64_t total_ns;      // solve and surface together
     pliant_solver_report report;
-    pliant_vec3 force;      // total contact force, N
+    pliant_vec3 force;  // total contact force, N
 } pliant_step;
 
 typedef struct pliant_expectation {
@@ -84,7 +84,8 @@ PLIANT_UNUSED_RESULT pliant_status pliant_player_play(pliant_player *player, pli
 
 // The last step; number 0 before any. Borrowed until the next step.
 const pliant_step *pliant_player_last(const pliant_player *player);
-// Displacements after the last step, shape [surface_count], zero before any; borrowed until destroy.
+// Displacements after the last step, shape [surface_count], zero before any; borrowed until
+// destroy.
 const pliant_vec3 *pliant_player_surface(const pliant_player *player);
 int32_t pliant_player_surface_count(const pliant_player *player);  // |K(level)|
 int32_t pliant_player_level(const pliant_player *player);

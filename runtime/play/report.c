@@ -26,8 +26,7 @@ static void write_probes(const pliant_player *player, FILE *stream)
     for (int32_t i = 0; i < count; i++) {
         fprintf(stream, "%-*s %8d ", width, probes[i].name, (int)probes[i].vertex);
         // Declared after the last step, on a level that was not reconstructed.
-        if (probes[i].step == 0)
-            fprintf(stream, "%13s %13s %13s\n", "-", "-", "-");
+        if (probes[i].step == 0) fprintf(stream, "%13s %13s %13s\n", "-", "-", "-");
         else
             fprintf(stream, "%13.6g %13.6g %13.6g\n", (double)probes[i].u.x, (double)probes[i].u.y,
                     (double)probes[i].u.z);
@@ -88,9 +87,9 @@ void pliant_report_write(const pliant_report *report, FILE *stream)
 
 void pliant_report_write_step(const pliant_player *player, const pliant_step *step, FILE *stream)
 {
-    fprintf(stream, "step %lld time %.9g us %.1f constraints %d level %d",
-            (long long)step->number, step->time, (double)step->total_ns * 1e-3,
-            (int)step->report.constraint_count, (int)step->report.level);
+    fprintf(stream, "step %lld time %.9g us %.1f constraints %d level %d", (long long)step->number,
+            step->time, (double)step->total_ns * 1e-3, (int)step->report.constraint_count,
+            (int)step->report.level);
     int32_t count;
     const pliant_probe *probes = pliant_player_probes(player, &count);
     for (int32_t i = 0; i < count; i++)

@@ -6,22 +6,17 @@
 // JSON knows no infinity and no NaN.
 static void put_number(double value, FILE *stream)
 {
-    if (isfinite(value))
-        fprintf(stream, "%.9g", value);
-    else
-        fputs("null", stream);
+    if (isfinite(value)) fprintf(stream, "%.9g", value);
+    else fputs("null", stream);
 }
 
 static void put_text(const char *text, FILE *stream)
 {
     fputc('"', stream);
     for (const unsigned char *c = (const unsigned char *)text; *c; c++) {
-        if (*c == '"' || *c == '\\')
-            fprintf(stream, "\\%c", *c);
-        else if (*c < 0x20)
-            fprintf(stream, "\\u%04x", *c);
-        else
-            fputc(*c, stream);
+        if (*c == '"' || *c == '\\') fprintf(stream, "\\%c", *c);
+        else if (*c < 0x20) fprintf(stream, "\\u%04x", *c);
+        else fputc(*c, stream);
     }
     fputc('"', stream);
 }
@@ -106,10 +101,8 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
         if (i) fputc(',', stream);
         put_text(probes[i].name, stream);
         fprintf(stream, ":{\"vertex\":%d,\"displacement\":", (int)probes[i].vertex);
-        if (probes[i].step == 0)
-            fputs("null", stream);
-        else
-            put_vec3(probes[i].u, stream);
+        if (probes[i].step == 0) fputs("null", stream);
+        else put_vec3(probes[i].u, stream);
         fputc('}', stream);
     }
     fputs("},\"force\":", stream);

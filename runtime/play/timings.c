@@ -2,8 +2,10 @@
 #include "timings.h"
 
 static const char *const phase_names[PLIANT_PHASE_COUNT] = {
-    [PLIANT_PHASE_CAPACITANCE] = "capacitance", [PLIANT_PHASE_CONTACT] = "contact",
-    [PLIANT_PHASE_SUMMATION] = "summation",     [PLIANT_PHASE_SURFACE] = "surface",
+    [PLIANT_PHASE_CAPACITANCE] = "capacitance",
+    [PLIANT_PHASE_CONTACT] = "contact",
+    [PLIANT_PHASE_SUMMATION] = "summation",
+    [PLIANT_PHASE_SURFACE] = "surface",
     [PLIANT_PHASE_TOTAL] = "total",
 };
 

@@ -15,9 +15,9 @@ typedef enum pliant_phase {
 
 typedef struct pliant_timings {
     pliant_histogram phases[PLIANT_PHASE_COUNT];
-    int64_t rough_count;            // steps that solved with PLIANT_ROUGH
-    int32_t most_constraints;       // the largest s
-} pliant_timings;  // zeroed is empty; about 300 kB
+    int64_t rough_count;       // steps that solved with PLIANT_ROUGH
+    int32_t most_constraints;  // the largest s
+} pliant_timings;              // zeroed is empty; about 300 kB
 
 const char *pliant_phase_name(pliant_phase phase);  // static
 void pliant_timings_add(pliant_timings *timings, const pliant_step *step);

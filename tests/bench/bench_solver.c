@@ -17,9 +17,9 @@
 #include <string.h>
 #include <unistd.h>
 
-extern void sgemv_(const char *trans, const int *m, const int *n, const float *alpha, const float *a,
-                   const int *lda, const float *x, const int *incx, const float *beta, float *y,
-                   const int *incy);
+extern void sgemv_(const char *trans, const int *m, const int *n, const float *alpha,
+                   const float *a, const int *lda, const float *x, const int *incx,
+                   const float *beta, float *y, const int *incy);
 extern void dgetrf_(const int *m, const int *n, double *a, const int *lda, int *pivots, int *info);
 extern void dgetri_(const int *n, double *a, const int *lda, const int *pivots, double *work,
                     const int *lwork, int *info);
@@ -75,7 +75,8 @@ static int compare_vertices(const void *a, const void *b)
 static void choose_patch(const pliant_model *model, int32_t patch, int32_t size, int32_t *vertices)
 {
     const pliant_model_domain *domain = &model->domains[PLIANT_DOMAIN_FREE];
-    const int32_t centre = domain->nodes[(int64_t)(patch + 1) * domain->count * 7 / 61 % domain->count];
+    const int32_t centre =
+        domain->nodes[(int64_t)(patch + 1) * domain->count * 7 / 61 % domain->count];
     const double *x = pliant_model_positions(model);
     near *list = malloc((size_t)domain->count * sizeof *list);
     for (int32_t p = 0; p < domain->count; p++) {
@@ -93,7 +94,8 @@ static void choose_patch(const pliant_model *model, int32_t patch, int32_t size,
 // ---- Baseline ----
 
 // u += 3m x 3 column blocks of the dense matrix, s of them.
-static double time_dense(int32_t m, const float *matrix, const int32_t *columns, int32_t s, float *u)
+static double time_dense(int32_t m, const float *matrix, const int32_t *columns, int32_t s,
+                         float *u)
 {
     const int rows = 3 * m, three = 3, one = 1;
     const float alpha = 1, value[3] = {1, 0.5f, -0.25f};
@@ -121,7 +123,8 @@ static float *random_matrix(int32_t m)
 static void time_lapack(int32_t s, double *factor, double *inverse)
 {
     const int n = 3 * s, work_count = 64 * n;
-    double *a = malloc((size_t)n * (size_t)n * sizeof *a), *work = malloc((size_t)work_count * sizeof *work);
+    double *a = malloc((size_t)n * (size_t)n * sizeof *a),
+           *work = malloc((size_t)work_count * sizeof *work);
     int *pivots = malloc((size_t)n * sizeof *pivots), info = 0;
     double factors[11], inverses[11];
     for (int r = 0; r < 11; r++) {
@@ -301,7 +304,9 @@ static void time_queries(const pliant_model *model)
         for (int kind = 0; kind < 2; kind++)
             for (int frame = 0; frame < frame_count; frame++) {
                 for (int32_t i = 0; i < count; i++)
-                    vertices[i] = domain->nodes[((int64_t)i * 977 + (kind ? frame * 131 : 0)) % domain->count];
+                    vertices[i] =
+                        domain
+                            ->nodes[((int64_t)i * 977 + (kind ? frame * 131 : 0)) % domain->count];
                 require(pliant_solver_solve(solver), NULL);
                 const double begin = now_us();
                 require(pliant_solver_displacements(solver, vertices, count, u), NULL);
@@ -328,8 +333,8 @@ int main(int argc, char **argv)
         printf("building a synthetic sphere of 2562 vertices\n");
         fflush(stdout);
         const char *eps = getenv("PLIANT_BENCH_EPS");
-        check_write_synthetic_model(own_path, NULL, 4, eps ? atof(eps) : 0.05, pliant_wavelet_default(),
-                                    CHECK_FREE_BLOCK);
+        check_write_synthetic_model(own_path, NULL, 4, eps ? atof(eps) : 0.05,
+                                    pliant_wavelet_default(), CHECK_FREE_BLOCK);
         path = own_path;
     }
     pliant_model *model = NULL;
@@ -339,18 +344,20 @@ int main(int argc, char **argv)
     const pliant_model_info info = pliant_model_describe(model);
     const int32_t m = info.free_count;
     const uint64_t nnz = model->greens[0][0].offset[m];
-    printf("%s: %d vertices, %d free, %d levels, factor %.1f, RMS %.3g, MAX %.3g, %.1f blocks a column\n",
-           path == own_path ? "synthetic sphere" : path, info.vertex_count, m, info.level_count, info.factor,
-           info.rms, info.max, (double)nnz / m);
+    printf("%s: %d vertices, %d free, %d levels, factor %.1f, RMS %.3g, MAX %.3g, %.1f blocks a "
+           "column\n",
+           path == own_path ? "synthetic sphere" : path, info.vertex_count, m, info.level_count,
+           info.factor, info.rms, info.max, (double)nnz / m);
 
     float *matrix = random_matrix(m);
     float *dense_u = malloc(3 * (size_t)m * sizeof *dense_u);
     pliant_vec3 *u = malloc((size_t)info.vertex_count * sizeof *u);
     if (!matrix || !dense_u || !u) return fprintf(stderr, "bench_solver: no memory\n"), 1;
     const double bandwidth = read_bandwidth(40 * nnz), transform = time_transform(model);
-    printf("transform %.2f us; %.1f MB of columns; read bandwidth over that much %.1f GB/s\n\n", transform,
-           40e-6 * (double)nnz, bandwidth * 1e-9);
-    printf("    s  dense sgemv |  sum  ns/block  read-bound |  surface  pack | full surface  ratio | contact   step\n");
+    printf("transform %.2f us; %.1f MB of columns; read bandwidth over that much %.1f GB/s\n\n",
+           transform, 40e-6 * (double)nnz, bandwidth * 1e-9);
+    printf("    s  dense sgemv |  sum  ns/block  read-bound |  surface  pack | full surface  ratio "
+           "| contact   step\n");
     step_times steps[size_count];
     for (int i = 0; i < size_count && sizes[i] <= m; i++) {
         const int32_t s = sizes[i];
@@ -365,8 +372,8 @@ int main(int argc, char **argv)
         steps[i] = time_steps(model, s, u);
         const step_times t = steps[i];
         const double full = t.sum + t.surface, baseline = median(dense, 101);
-        printf("%5d %12.1f | %5.2f %8.2f %10.2f | %8.2f %5.2f | %12.2f %6.1f | %7.2f %6.2f\n", s, baseline,
-               t.sum, 1e3 * t.sum / t.blocks, 40 * t.blocks / bandwidth * 1e6, t.surface,
+        printf("%5d %12.1f | %5.2f %8.2f %10.2f | %8.2f %5.2f | %12.2f %6.1f | %7.2f %6.2f\n", s,
+               baseline, t.sum, 1e3 * t.sum / t.blocks, 40 * t.blocks / bandwidth * 1e6, t.surface,
                t.surface - transform, full, baseline / full, t.contact, t.step);
     }
     free(matrix);

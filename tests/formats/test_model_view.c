@@ -124,6 +124,7 @@ static void wrong_numbers_are_refused_by_section_and_element(void **state)
         {"/mesh/level_count", 2, 65, "/mesh/level_count: finest level: expected 66 vertices, found 65"},
         {"/mesh/level_count", 0, 5, "/mesh/parents: expected length 61 along axis 0, found 60"},
         {"/mesh/parents", 0, 6, "/mesh/parents: vertex 6 of level 1: expected two vertices below 6, found 6"},
+        {"/mesh/parents", 1, 0, "/mesh/parents: vertex 6 of level 1: expected two vertices below 6, found 0 and 0"},
         {"/mesh/parents", 0, -1, "/mesh/parents: vertex 6 of level 1"},
         {"/mesh/parents", -1, 65, "/mesh/parents: vertex 65 of level 2: expected two vertices below 18"},
         {"/mesh/source_index", 3, -2, "/mesh/source_index: element 3: expected -1 to 2147483647, found -2"},

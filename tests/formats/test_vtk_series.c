@@ -1,4 +1,5 @@
-// test_vtk_series.c: the VTK series is valid XML, holds the numbers it was given, and is whole or absent.
+// test_vtk_series.c: the VTK series is valid XML, holds the numbers it was given, and is whole or
+// absent.
 #include "check.h"
 
 #include "pliant/vtk_series.h"

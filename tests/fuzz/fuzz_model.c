@@ -1,4 +1,5 @@
-// fuzz_model.c: libFuzzer target: no bytes make the reader, the views or pliant_model_open misbehave.
+// fuzz_model.c: libFuzzer target: no bytes make the reader, the views or pliant_model_open
+// misbehave.
 //
 // An input is a model or dense file with its padding squeezed out (a page per section would be
 // mostly zeros): a byte for the kind, header and table, then the sections one after the other.
@@ -76,7 +77,8 @@ static unsigned char *spread_out(const seed *s, const uint8_t *data, size_t size
 {
     size_t total = 0, end = 0;
     for (int32_t i = 0; i < s->span_count && total < size; i++) {
-        const size_t part = size - total < s->spans[i].bytes ? size - total : (size_t)s->spans[i].bytes;
+        const size_t part =
+            size - total < s->spans[i].bytes ? size - total : (size_t)s->spans[i].bytes;
         end = (size_t)s->spans[i].offset + part;
         total += part;
     }
@@ -119,7 +121,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         pliant_model_view model;
         pliant_dense_view dense;
         const pliant_status bound = pliant_model_view_bind(reader, &model, &err);
-        if (pliant_dense_view_bind(reader, &dense, &err) == PLIANT_OK && dense.free_count < 1) abort();
+        if (pliant_dense_view_bind(reader, &dense, &err) == PLIANT_OK && dense.free_count < 1)
+            abort();
         if (pliant_reader_verify(reader, &err) < 0 && strchr(err.text, '\n')) abort();
         pliant_reader_close(reader);
         if (bound == PLIANT_OK) open_model(bytes, file_size);

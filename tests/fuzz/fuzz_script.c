@@ -16,11 +16,15 @@ int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static const char *const seeds[] = {
-    "pliant-script 1\nprobe nose vertex 812\nprobe tip near 0.1 -2e-3 +1.3\ndisplace 812 0 0 -0.02\nstep\n",
-    "pliant-script 1\r\ndisplace 1:17 0 0 -0.02 # comment\r\ntraction source 3 0 0 -100\r\nstep 100\r\n",
-    "\xef\xbb\xbfpliant-script 1\nforce near 1 2 3 0 0 -3\nsupport 30 0 0 0.01\ngravity 0 0 -9.81\ndt 1e-3\n",
+    "pliant-script 1\nprobe nose vertex 812\nprobe tip near 0.1 -2e-3 +1.3\ndisplace 812 0 0 "
+    "-0.02\nstep\n",
+    "pliant-script 1\r\ndisplace 1:17 0 0 -0.02 # comment\r\ntraction source 3 0 0 -100\r\nstep "
+    "100\r\n",
+    "\xef\xbb\xbfpliant-script 1\nforce near 1 2 3 0 0 -3\nsupport 30 0 0 0.01\ngravity 0 0 "
+    "-9.81\ndt 1e-3\n",
     "pliant-script 1\nrelease 812\nrelease all\nexpect nose 0 0 -0.02 1e-3\n\n# \xc3\xa4\n",
-    "pliant-script 2\n", "step x\nrelease\ndt -1\nexpect a,b\ngravity nan inf 1e999\n",
+    "pliant-script 2\n",
+    "step x\nrelease\ndt -1\nexpect a,b\ngravity nan inf 1e999\n",
 };
 
 // PLIANT_FUZZ_SEEDS names the folder to leave valid inputs in.
@@ -44,9 +48,11 @@ static void check_statement(const pliant_statement *s)
 {
     for (int d = 0; d < 3; d++)
         if (!isfinite(s->value[d]) || !isfinite(s->vertex.position[d])) abort();
-    if (!isfinite(s->scalar) || s->column < 1 || s->vertex.number < 0 || s->vertex.level < 0) abort();
+    if (!isfinite(s->scalar) || s->column < 1 || s->vertex.number < 0 || s->vertex.level < 0)
+        abort();
     if (!memchr(s->name, 0, sizeof s->name)) abort();
-    if ((s->kind == PLIANT_STATEMENT_STEP || s->kind == PLIANT_STATEMENT_VERSION) && s->count < 1) abort();
+    if ((s->kind == PLIANT_STATEMENT_STEP || s->kind == PLIANT_STATEMENT_VERSION) && s->count < 1)
+        abort();
     if (s->kind == PLIANT_STATEMENT_DT && !(s->scalar > 0)) abort();
 }
 
@@ -58,7 +64,8 @@ static int parse_line(const char *text, size_t length, int64_t line, int first)
     memcpy(copy, text, length);
     pliant_statement s;
     pliant_error err;
-    const pliant_status status = pliant_statement_parse(copy, length, "fuzz", line, first, &s, &err);
+    const pliant_status status =
+        pliant_statement_parse(copy, length, "fuzz", line, first, &s, &err);
     free(copy);
     if (status < 0) {
         if (strncmp(err.text, "fuzz:", 5) != 0 || strchr(err.text, '\n')) abort();
@@ -86,7 +93,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         at = stop ? stop + 1 : end;
         line++;
         if (stop && length > 0 && text[length - 1] == '\r') length--;
-        if (line == 1 && length >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) text += 3, length -= 3;
+        if (line == 1 && length >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0)
+            text += 3, length -= 3;
         const int expected = parse_line(text, length, line, first);
         if (expected == PLIANT_STATEMENT_NONE) continue;
         pliant_statement s = {.kind = PLIANT_STATEMENT_NONE};

@@ -91,7 +91,8 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
     pliant_solver *solver = NULL;
     check_ok(pliant_model_open(path, &model, &err), &err);
     unlink(path);
-    const pliant_solver_def def = {.constraint_capacity = 100, .load_capacity = 50, .cache_count = 2};
+    const pliant_solver_def def = {
+        .constraint_capacity = 100, .load_capacity = 50, .cache_count = 2};
     check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
 
     const int32_t n = pliant_model_describe(model).vertex_count;
@@ -104,7 +105,8 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
         const int32_t centre = check_random_index(&random, n);
         const int32_t changes = frame % 50 == 0 ? 120 : 12;
         for (int i = 0; i < changes; i++) {
-            const pliant_node node = {3, frame % 2 ? check_random_index(&random, n) : (centre + i) % n};
+            const pliant_node node = {3, frame % 2 ? check_random_index(&random, n)
+                                                   : (centre + i) % n};
             const pliant_vec3 value = {0, (float)check_random_next(&random), 0.1f};
             const double kind = check_random_next(&random);
             const int32_t is_free = pliant_model_is_free(model, node.vertex);
@@ -119,7 +121,8 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
             }
         }
         if (frame % 7 == 0)
-            assert_int_equal(pliant_solver_gravity(solver, (pliant_vec3){0, 0, (float)frame}), PLIANT_OK);
+            assert_int_equal(pliant_solver_gravity(solver, (pliant_vec3){0, 0, (float)frame}),
+                             PLIANT_OK);
         if (pliant_solver_constraint_count(solver) > largest)
             largest = pliant_solver_constraint_count(solver);
         assert_true(pliant_solver_solve(solver) >= 0);
@@ -127,9 +130,11 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
         int32_t probes[20];
         for (int i = 0; i < 20; i++) probes[i] = check_random_index(&random, n);
         assert_int_equal(pliant_solver_displacements(solver, probes, 1 + frame % 20, u), PLIANT_OK);
-        assert_int_equal(pliant_solver_displacements(solver, (const int32_t[]){5, 9, 17, 600}, 4, u), PLIANT_OK);
+        assert_int_equal(
+            pliant_solver_displacements(solver, (const int32_t[]){5, 9, 17, 600}, 4, u), PLIANT_OK);
         assert_int_equal(pliant_solver_surface(solver, frame % 4, u), PLIANT_OK);
-        assert_int_equal(pliant_solver_tractions(solver, frame % 3 ? probes : NULL, 20, u), PLIANT_OK);
+        assert_int_equal(pliant_solver_tractions(solver, frame % 3 ? probes : NULL, 20, u),
+                         PLIANT_OK);
         (void)pliant_solver_contact_force(solver);
         if (frame % 60 == 59) pliant_solver_release_all(solver);
     }

@@ -32,8 +32,8 @@ static void extracted_elements_equal_the_reconstructed_matrices(void **state)
         const pliant_wavelet_def wavelet = {(pliant_wavelet_scheme)(kind & 1),
                                             (pliant_wavelet_lifting)(kind >> 1 & 1),
                                             (pliant_wavelet_boundary)(kind >> 2)};
-        check_synthetic *s = check_synthetic_create(
-            &(check_synthetic_def){2, 0.05, wavelet, CHECK_ALL_BLOCKS});
+        check_synthetic *s =
+            check_synthetic_create(&(check_synthetic_def){2, 0.05, wavelet, CHECK_ALL_BLOCKS});
         pliant_model *model = open_written(s);
         check_synthetic_round(s);
         enum { capacity = 30 };
@@ -61,10 +61,12 @@ static void extracted_elements_equal_the_reconstructed_matrices(void **state)
                     for (size_t r = 0; r < 3; r++)
                         for (size_t c = 0; c < 3; c++) {
                             const double expected =
-                                s->xi[2 * rd + cd][(3 * (size_t)model->position[vertices[i]] + r) * width +
-                                                   3 * (size_t)model->position[vertices[j]] + c];
-                            const double found = scratch.compliance[3 * (size_t)i + r +
-                                                                    (3 * (size_t)j + c) * capacitance.stride];
+                                s->xi[2 * rd + cd]
+                                     [(3 * (size_t)model->position[vertices[i]] + r) * width +
+                                      3 * (size_t)model->position[vertices[j]] + c];
+                            const double found =
+                                scratch.compliance[3 * (size_t)i + r +
+                                                   (3 * (size_t)j + c) * capacitance.stride];
                             largest[2 * rd + cd] = fmax(largest[2 * rd + cd], fabs(expected));
                             worst[2 * rd + cd] = fmax(worst[2 * rd + cd], fabs(found - expected));
                         }
@@ -85,7 +87,8 @@ static void check_spoilt(float factor, pliant_status expected)
         &(check_synthetic_def){2, 0.02, pliant_wavelet_default(), CHECK_FREE_BLOCK});
     struct check_compressed *columns = &s->compressed[PLIANT_FREE_FREE];
     const int32_t spoilt = 70;
-    for (uint64_t e = 9 * columns->column_offset[spoilt]; e < 9 * columns->column_offset[spoilt + 1]; e++)
+    for (uint64_t e = 9 * columns->column_offset[spoilt];
+         e < 9 * columns->column_offset[spoilt + 1]; e++)
         columns->block[e] *= factor;
     pliant_model *model = open_written(s);
     pliant_solver *solver = NULL;
@@ -94,7 +97,8 @@ static void check_spoilt(float factor, pliant_status expected)
     const pliant_vec3 down = {0, 0.02f, -0.1f};
     for (int32_t k = 0; k < 5; k++)
         assert_int_equal(
-            pliant_solver_displace(solver, (pliant_node){2, s->nodes[0][spoilt - 2 + k]}, down), PLIANT_OK);
+            pliant_solver_displace(solver, (pliant_node){2, s->nodes[0][spoilt - 2 + k]}, down),
+            PLIANT_OK);
     for (int round = 0; round < 2; round++) {  // built, and from the cache
         pliant_vec3 u[162], p[162];
         int32_t count = s->counts[0];
@@ -108,12 +112,17 @@ static void check_spoilt(float factor, pliant_status expected)
             assert_true(isfinite(p[i].x) && isfinite(p[i].y) && isfinite(p[i].z));
         for (int32_t k = 0; k < 5; k++)
             assert_memory_equal(&u[s->nodes[0][spoilt - 2 + k]], &down, sizeof down);
-        assert_true(isfinite(pliant_solver_contact_force(solver).z));
-        print_message("force %g\n", (double)pliant_solver_contact_force(solver).z);
-        assert_true(pliant_solver_contact_force(solver).z != 0);
+        // A sound patch takes 0.33 to be pushed down; one singular column of five leaves that size.
+        const double force = -(double)pliant_solver_contact_force(solver).z;
+        assert_true(isfinite(force));
+        if (factor == 0 || factor == 1) {
+            check_at_least(force, 0.1);
+            check_at_most(force, 3);
+        }
     }
     // A patch without the spoilt column is sound.
-    assert_int_equal(pliant_solver_release(solver, (pliant_node){2, s->nodes[0][spoilt]}), PLIANT_OK);
+    assert_int_equal(pliant_solver_release(solver, (pliant_node){2, s->nodes[0][spoilt]}),
+                     PLIANT_OK);
     assert_int_equal(pliant_solver_solve(solver), PLIANT_OK);
     pliant_solver_destroy(solver);
     pliant_model_close(model);

@@ -45,7 +45,8 @@ static void every_kernel_equals_the_reference_for_every_count(void **state)
             memcpy(found, start, sizeof start);
             pliant_columns_add_plain(row, block, count, value, expected);
             kernel(row, block, count, value, found);
-            // Three products and sums of numbers below one, fused or not: 4 roundings of at most 4 u.
+            // Three products and sums of numbers below one, fused or not: 4 roundings of at most 4
+            // u.
             for (int i = 0; i < 4 * row_total; i++) check_near(found[i], expected[i], 16 * 0x1p-24);
             for (int r = 0; r < row_total; r++) assert_true(found[4 * r + 3] == 0);
         }

@@ -25,8 +25,8 @@ static fixture create(double eps, check_blocks blocks)
     assert_non_null(mkdtemp(f.folder));
     snprintf(f.model_path, sizeof f.model_path, "%s/model.h5", f.folder);
     snprintf(f.dense_path, sizeof f.dense_path, "%s/dense.h5", f.folder);
-    const check_synthetic_def def = {.levels = 2, .eps = eps, .blocks = blocks,
-                                     .wavelet = pliant_wavelet_default()};
+    const check_synthetic_def def = {
+        .levels = 2, .eps = eps, .blocks = blocks, .wavelet = pliant_wavelet_default()};
     f.synthetic = check_synthetic_create(&def);
     check_synthetic_write(f.synthetic, f.model_path);
     check_synthetic_write_dense(f.synthetic, f.dense_path);
@@ -153,6 +153,39 @@ static void exact_answers_are_those_of_the_stiffness_matrix(void **state)
     destroy(&f);
 }
 
+// One vertex at a time, all of them twice, so that gathered columns are replaced and read again.
+static void one_unit_value_gives_one_column_of_the_dense_file(void **state)
+{
+    (void)state;
+    fixture f = create(0, CHECK_ALL_BLOCKS);
+    const check_synthetic *s = f.synthetic;
+    const size_t m = (size_t)s->counts[0];
+    pliant_error err;
+    pliant_compare *compare;
+    pliant_player *player = create_player(&f);
+    check_ok(pliant_compare_open(f.dense_path, f.model, &compare, &err), &err);
+    const double *exact = pliant_compare_exact(compare);
+    for (int round = 0; round < 2; round++)
+        for (int domain = 0; domain < 2; domain++)
+            for (int32_t j = 0; j < s->counts[domain]; j++) {
+                const int32_t vertex = s->nodes[domain][j];
+                const double *xi = s->xi[domain == 0 ? PLIANT_FREE_FREE : PLIANT_FREE_FIXED];
+                const size_t width = 3 * (size_t)s->counts[domain];
+                execute(player, domain == 0 ? PLIANT_STATEMENT_TRACTION : PLIANT_STATEMENT_SUPPORT,
+                        vertex, 0, 0, 1);
+                execute(player, PLIANT_STATEMENT_STEP, 0, 0, 0, 0);
+                check_ok(pliant_compare_add(compare, player, &err), &err);
+                for (size_t i = 0; i < m; i++)
+                    for (size_t r = 0; r < 3; r++)
+                        check_near(exact[3 * (size_t)s->nodes[0][i] + r],
+                                   xi[(3 * i + r) * width + 3 * (size_t)j + 2], 0);
+                execute(player, PLIANT_STATEMENT_RELEASE, vertex, 0, 0, 0);
+            }
+    pliant_compare_close(compare);
+    pliant_player_destroy(player);
+    destroy(&f);
+}
+
 // The figures, computed again from the surface and the exact answer.
 static void figures_are_relative_norms_and_the_worst_step_is_named(void **state)
 {
@@ -272,6 +305,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exact_answers_are_those_of_the_stiffness_matrix),
+        cmocka_unit_test(one_unit_value_gives_one_column_of_the_dense_file),
         cmocka_unit_test(figures_are_relative_norms_and_the_worst_step_is_named),
         cmocka_unit_test(nothing_against_nothing_is_no_difference),
         cmocka_unit_test(a_dense_file_without_supports_refuses_a_moved_support),

@@ -52,7 +52,8 @@ static void the_inverse_times_the_matrix_is_one(void **state)
         for (size_t i = 0; i < n; i++)
             for (size_t j = 0; j < n; j++) {
                 double sum = i == j ? -1 : 0;
-                for (size_t l = 0; l < n; l++) sum += s->copy[i + l * stride] * s->matrix[l + j * stride];
+                for (size_t l = 0; l < n; l++)
+                    sum += s->copy[i + l * stride] * s->matrix[l + j * stride];
                 largest = fmax(largest, fabs(sum));
                 size = fmax(size, fabs(s->matrix[i + j * stride]));
             }
@@ -72,7 +73,8 @@ static void a_singular_matrix_has_pivot_ratio_zero_or_round_off(void **state)
     for (int k = 1; k < size_count; k++) {
         const size_t n = (size_t)sizes[k], stride = pliant_dense_stride(n);
         fill(&random, s->matrix, n, stride);
-        for (size_t i = 0; i < n; i++) s->matrix[i + (n - 1) * stride] = s->matrix[i];  // column twice
+        for (size_t i = 0; i < n; i++)
+            s->matrix[i + (n - 1) * stride] = s->matrix[i];  // column twice
         check_at_most(pliant_dense_invert(n, stride, s->matrix, s->pivots, s->work),
                       (double)n * 0x1p-52);
         memset(s->matrix, 0, n * stride * sizeof(double));
@@ -104,14 +106,16 @@ static void definiteness_is_the_sign_of_the_smallest_eigenvalue(void **state)
         dsyev_("N", "L", &n, packed, &n, values, work, &(int){3 * limit}, &info);
         free(packed);
         assert_int_equal(info, 0);
-        // Shift the smallest eigenvalue to just above and just below zero, by far more than n u |A|.
+        // Shift the smallest eigenvalue to just above and just below zero, by far more than n u
+        // |A|.
         for (int sign = -1; sign <= 1; sign += 2) {
             memset(s->matrix, 0, (size_t)n * stride * sizeof(double));
             for (int j = 0; j < n; j++)
                 for (int i = j; i < n; i++)
                     s->matrix[i + (size_t)j * stride] =
                         s->copy[i + (size_t)j * n] + (i == j ? sign * 1e-9 - values[0] : 0);
-            assert_int_equal(pliant_dense_definite((size_t)n, stride, s->matrix, s->work), sign > 0);
+            assert_int_equal(pliant_dense_definite((size_t)n, stride, s->matrix, s->work),
+                             sign > 0);
         }
         memset(s->matrix, 0, (size_t)n * stride * sizeof(double));
         for (int j = 0; j < n; j++) s->matrix[j + (size_t)j * stride] = j == n / 2 ? NAN : 1;

@@ -79,6 +79,8 @@ static void merging_is_adding_all(void **state)
         pliant_histogram_add(i % 3 ? a : b, value);
         pliant_histogram_add(all, value);
     }
+    pliant_histogram_add(b, 2000000);  // the worst of both
+    pliant_histogram_add(all, 2000000);
     pliant_histogram_merge(a, b);
     assert_int_equal(a->count, all->count);
     assert_int_equal(a->worst, all->worst);

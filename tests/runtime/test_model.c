@@ -59,12 +59,15 @@ static void a_model_describes_what_was_written(void **state)
     assert_int_equal(pliant_model_level_face_count(model, 2), 0);
     assert_non_null(pliant_model_faces(model, 0));
     assert_null(pliant_model_faces(model, 2));
-    assert_memory_equal(pliant_model_positions(model), s->surface.mesh->vertices, 3 * 42 * sizeof(double));
+    assert_memory_equal(pliant_model_positions(model), s->surface.mesh->vertices,
+                        3 * 42 * sizeof(double));
     for (int32_t v = 0; v < 42; v++) {
         assert_int_equal(pliant_model_from_source(model, 41 - v), v);
-        assert_int_equal(pliant_model_is_free(model, v), s->surface.mesh->vertices[3 * v + 2] >= -0.6);
+        assert_int_equal(pliant_model_is_free(model, v),
+                         s->surface.mesh->vertices[3 * v + 2] >= -0.6);
         check_near(pliant_model_area(model, v), s->surface.areas[v], 1e-15);
-        const int32_t nearest = pliant_model_nearest(model, s->surface.mesh->vertices + 3 * (size_t)v);
+        const int32_t nearest =
+            pliant_model_nearest(model, s->surface.mesh->vertices + 3 * (size_t)v);
         if (pliant_model_is_free(model, v)) assert_int_equal(nearest, v);
         else assert_int_equal(pliant_model_is_free(model, nearest), 1);
     }
@@ -134,7 +137,8 @@ static int use_broken(pliant_status *verified)
     check_ok(pliant_solver_create(model, NULL, &solver, &err), &err);
     for (int32_t v = 0; v < n; v += 3) {
         (void)!pliant_solver_displace(solver, (pliant_node){finest, v}, (pliant_vec3){0, 0, 1});
-        (void)!pliant_solver_press(solver, (pliant_node){finest, (v + 1) % n}, (pliant_vec3){0, 0, 1});
+        (void)!pliant_solver_press(solver, (pliant_node){finest, (v + 1) % n},
+                                   (pliant_vec3){0, 0, 1});
     }
     assert_true(pliant_solver_solve(solver) >= 0);
     assert_int_equal(pliant_solver_surface(solver, finest, u), PLIANT_OK);
@@ -177,7 +181,8 @@ static void flipped_bits_are_refused_or_found_by_verify_and_never_crash(void **s
         pliant_status verified = PLIANT_OK;
         if (use_broken(&verified)) {
             opened++;
-            if (verified == PLIANT_OK) fail_msg("flip of bit %d at byte %zu was not found", bit, at);
+            if (verified == PLIANT_OK)
+                fail_msg("flip of bit %d at byte %zu was not found", bit, at);
         }
         bytes[at] ^= bit;
     }

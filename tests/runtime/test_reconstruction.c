@@ -17,9 +17,9 @@ typedef struct setting {
     pliant_arena arena;
     pliant_reconstruction plan;
     pliant_reconstruction_scratch scratch;
-    double *exact;         // values, shape [count + 1][3]
-    float *coefficients;   // shape [count + 1][4]
-    float *work;           // shape [count][16]
+    double *exact;        // values, shape [count + 1][3]
+    float *coefficients;  // shape [count + 1][4]
+    float *work;          // shape [count][16]
 } setting;
 
 // A domain with a hole: vertices with z > -0.4, so that stencils are cut.
@@ -32,7 +32,9 @@ static setting set_up(check_surface surface, pliant_wavelet_def def, check_rando
     int32_t *nodes = malloc((size_t)n * sizeof *nodes), count = 0;
     for (int32_t v = 0; v < n; v++)
         if (surface.mesh->vertices[3 * (size_t)v + 2] > -0.4) nodes[count++] = v;
-    check_ok(pliant_wavelet_create(s.hierarchy, surface.areas, nodes, count, &def, &s.wavelet, &err), &err);
+    check_ok(
+        pliant_wavelet_create(s.hierarchy, surface.areas, nodes, count, &def, &s.wavelet, &err),
+        &err);
     free(nodes);
     for (int pass = 0; pass < 2; pass++) {
         if (pass) check_ok(pliant_arena_reserve(&s.arena, &err), &err);
@@ -45,7 +47,8 @@ static setting set_up(check_surface surface, pliant_wavelet_def def, check_rando
     pliant_reconstruction_scratch_begin(s.wavelet, &s.scratch);
     for (int32_t i = 0; i < 3 * count; i++) s.exact[i] = 2 * check_random_next(random) - 1;
     for (int32_t p = 0; p < count; p++)
-        for (int c = 0; c < 3; c++) s.coefficients[4 * (size_t)p + c] = (float)s.exact[3 * (size_t)p + c];
+        for (int c = 0; c < 3; c++)
+            s.coefficients[4 * (size_t)p + c] = (float)s.exact[3 * (size_t)p + c];
     for (int32_t p = 0; p < count; p++)
         for (int c = 0; c < 3; c++) s.exact[3 * (size_t)p + c] = s.coefficients[4 * (size_t)p + c];
     pliant_wavelet_inverse(s.wavelet, s.wavelet->level_count - 1, 3, s.exact);
@@ -62,7 +65,8 @@ static void tear_down(setting *s)
 
 static pliant_wavelet_def wavelet_number(int kind)
 {
-    return (pliant_wavelet_def){(pliant_wavelet_scheme)(kind & 1), (pliant_wavelet_lifting)(kind >> 1 & 1),
+    return (pliant_wavelet_def){(pliant_wavelet_scheme)(kind & 1),
+                                (pliant_wavelet_lifting)(kind >> 1 & 1),
                                 (pliant_wavelet_boundary)(kind >> 2)};
 }
 
@@ -78,14 +82,16 @@ static void check_values(setting *s, const int32_t *positions, int32_t count)
     pliant_reconstruction_run(&s->plan, s->coefficients, s->work);
     for (int32_t i = 0; i < count; i++)
         for (int c = 0; c < 3; c++)
-            check_near(s->work[4 * (size_t)slots[i] + c], s->exact[3 * (size_t)positions[i] + c], tolerance);
+            check_near(s->work[4 * (size_t)slots[i] + c], s->exact[3 * (size_t)positions[i] + c],
+                       tolerance);
 
     // The same on blocks: column k of a block is the field times k + 1.
     pliant_reconstruction_map(&s->plan, &s->scratch);
     for (int32_t p = 0; p < s->wavelet->count; p++) {
         const int32_t slot = s->scratch.slot_of[p];
         for (int e = 0; slot >= 0 && e < 9; e++)
-            s->work[16 * (size_t)slot + e] = (float)(e % 3 + 1) * s->coefficients[4 * (size_t)p + e / 3];
+            s->work[16 * (size_t)slot + e] =
+                (float)(e % 3 + 1) * s->coefficients[4 * (size_t)p + e / 3];
     }
     pliant_reconstruction_unmap(&s->plan, &s->scratch);
     pliant_reconstruction_run_blocks(&s->plan, s->work);

@@ -30,6 +30,7 @@ static fixture set_up(int32_t levels, double eps, pliant_wavelet_def wavelet, ch
     snprintf(f.path, sizeof f.path, "/tmp/pliant_test_solver_%d.h5", (int)getpid());
     check_synthetic_write(f.exact, f.path);
     check_ok(pliant_model_open(f.path, &f.model, &err), &err);
+    unlink(f.path);  // the mapping stays; nothing is left behind when a case fails
     check_ok(pliant_solver_create(f.model, &def, &f.solver, &err), &err);
     f.n = f.exact->surface.mesh->vertex_count;
     return f;
@@ -39,7 +40,6 @@ static void tear_down(fixture *f)
 {
     pliant_solver_destroy(f->solver);
     pliant_model_close(f->model);
-    unlink(f->path);
     check_synthetic_destroy(f->exact);
 }
 
@@ -73,7 +73,8 @@ static void put_vector(double *values, int32_t vertex, pliant_vec3 v)
 }
 
 // State one boundary value problem to both sides.
-static void specify(fixture *f, check_problem *problem, int32_t vertex, int32_t displaced, pliant_vec3 value)
+static void specify(fixture *f, check_problem *problem, int32_t vertex, int32_t displaced,
+                    pliant_vec3 value)
 {
     const pliant_node node = node_of(f, vertex);
     const int32_t is_free = pliant_model_is_free(f->model, vertex);
@@ -87,8 +88,8 @@ static void specify(fixture *f, check_problem *problem, int32_t vertex, int32_t 
 
 enum { with_displaced = 1, with_pressed = 2, with_supports = 4, with_freed = 8, with_gravity = 16 };
 
-// Sizes of random values such that each kind of load moves the surface by about as much: the sphere's
-// compliance is about 1 / (E R) and its area 4 pi.
+// Sizes of random values such that each kind of load moves the surface by about as much: the
+// sphere's compliance is about 1 / (E R) and its area 4 pi.
 static void specify_random(fixture *f, check_problem *problem, check_random *random, int32_t kinds,
                            int32_t count)
 {
@@ -133,30 +134,34 @@ static double largest_difference(const pliant_vec3 *found, const double *expecte
 
 // Solve with the library and compare displacements and tractions of all vertices, relative to the
 // largest of each.
-static void compare(fixture *f, const double *u, const double *p, double u_tolerance, double p_tolerance)
+static void compare(fixture *f, const double *u, const double *p, double u_tolerance,
+                    double p_tolerance)
 {
     pliant_vec3 *found = calloc((size_t)f->n, sizeof *found);
     assert_non_null(found);
     assert_int_equal(pliant_solver_solve(f->solver), PLIANT_OK);
     assert_int_equal(pliant_solver_surface(f->solver, f->finest, found), PLIANT_OK);
-    check_at_most(largest_difference(found, u, f->n) / fmax(largest(u, 3 * f->n), 1e-30), u_tolerance);
+    check_at_most(largest_difference(found, u, f->n) / fmax(largest(u, 3 * f->n), 1e-30),
+                  u_tolerance);
     if (p) {
         assert_int_equal(pliant_solver_tractions(f->solver, NULL, f->n, found), PLIANT_OK);
-        check_at_most(largest_difference(found, p, f->n) / fmax(largest(p, 3 * f->n), 1e-30), p_tolerance);
+        check_at_most(largest_difference(found, p, f->n) / fmax(largest(p, 3 * f->n), 1e-30),
+                      p_tolerance);
     }
     free(found);
 }
 
 // ---- Against a direct solve of the changed problem ----
 
-// Stored coefficients are floats, u = 2^-24 = 6e-8, and a value is the sum of some hundred products of
-// them whose roundings are independent: 10 u of the largest. C inherits that, relative to its
-// diagonal, and C^-1 magnifies it by the condition of C, some ten for scattered nodes of this sphere
-// (a node's neighbours move a third as much as itself): 100 u = 6e-6 for tractions. Displacements are
-// C's image of those and lose the factor again: 30 u = 2e-6.
+// Stored coefficients are floats, u = 2^-24 = 6e-8, and a value is the sum of some hundred products
+// of them whose roundings are independent: 10 u of the largest. C inherits that, relative to its
+// diagonal, and C^-1 magnifies it by the condition of C, some ten for scattered nodes of this
+// sphere (a node's neighbours move a third as much as itself): 100 u = 6e-6 for tractions.
+// Displacements are C's image of those and lose the factor again: 30 u = 2e-6.
 static const double u_tolerance = 30 * 0x1p-24, p_tolerance = 100 * 0x1p-24;
 
-static void check_against_direct(pliant_wavelet_def wavelet, int32_t levels, int32_t kinds, uint64_t seed)
+static void check_against_direct(pliant_wavelet_def wavelet, int32_t levels, int32_t kinds,
+                                 uint64_t seed)
 {
     fixture f = set_up(levels, 0, wavelet, CHECK_ALL_BLOCKS, roomy);
     check_random random = check_random_seed(seed);
@@ -197,19 +202,20 @@ static void freed_supports_equal_a_direct_solve(void **state)
 {
     (void)state;
     check_against_direct(pliant_wavelet_default(), 2,
-                         with_displaced | with_pressed | with_supports | with_freed | with_gravity, 4);
+                         with_displaced | with_pressed | with_supports | with_freed | with_gravity,
+                         4);
 }
 
 static void every_wavelet_equals_a_direct_solve(void **state)
 {
     (void)state;
     for (int32_t kind = 0; kind < 8; kind++)
-        check_against_direct(
-            (pliant_wavelet_def){(pliant_wavelet_scheme)(kind & 1),
-                                 (pliant_wavelet_lifting)(kind >> 1 & 1),
-                                 (pliant_wavelet_boundary)(kind >> 2)},
-            kind == 1 ? 3 : 1 + kind % 2, with_displaced | with_pressed | with_freed | with_gravity,
-            10 + (uint64_t)kind);
+        check_against_direct((pliant_wavelet_def){(pliant_wavelet_scheme)(kind & 1),
+                                                  (pliant_wavelet_lifting)(kind >> 1 & 1),
+                                                  (pliant_wavelet_boundary)(kind >> 2)},
+                             kind == 1 ? 3 : 1 + kind % 2,
+                             with_displaced | with_pressed | with_freed | with_gravity,
+                             10 + (uint64_t)kind);
 }
 
 // ---- Against the same algorithm on the thresholded matrices ----
@@ -221,7 +227,8 @@ static void thresholded_columns_equal_the_dense_algorithm_on_what_is_stored(void
     check_at_least(f.exact->compressed[PLIANT_FREE_FREE].summary[PLIANT_SUMMARY_FACTOR], 1.5);
     check_random random = check_random_seed(5);
     double *u = calloc(3 * (size_t)f.n, sizeof *u), *p = calloc(3 * (size_t)f.n, sizeof *p);
-    double *u_exact = calloc(3 * (size_t)f.n, sizeof *u), *p_exact = calloc(3 * (size_t)f.n, sizeof *p);
+    double *u_exact = calloc(3 * (size_t)f.n, sizeof *u),
+           *p_exact = calloc(3 * (size_t)f.n, sizeof *p);
     check_synthetic_round(f.exact);
     for (int round = 0; round < 4; round++) {
         check_problem problem = check_problem_create(f.exact);
@@ -287,7 +294,8 @@ static double vector_size(const pliant_vec3 *a, int32_t count)
 {
     double most = 0;
     for (int32_t i = 0; i < count; i++)
-        most = fmax(most, fmax(fabs((double)a[i].x), fmax(fabs((double)a[i].y), fabs((double)a[i].z))));
+        most = fmax(most,
+                    fmax(fabs((double)a[i].x), fmax(fabs((double)a[i].y), fabs((double)a[i].z))));
     return most;
 }
 
@@ -315,10 +323,13 @@ static void chosen_vertices_equal_the_whole_surface(void **state)
             // A level between puts another one's values into the rows.
             assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
             if (round % 3 == 1)
-                assert_int_equal(pliant_solver_surface(f.solver, 1, (pliant_vec3[162]){{0}}), PLIANT_OK);
-            assert_int_equal(pliant_solver_displacements(f.solver, vertices, count, chosen), PLIANT_OK);
+                assert_int_equal(pliant_solver_surface(f.solver, 1, (pliant_vec3[162]){{0}}),
+                                 PLIANT_OK);
+            assert_int_equal(pliant_solver_displacements(f.solver, vertices, count, chosen),
+                             PLIANT_OK);
             for (int32_t i = 0; i < count; i++)
-                check_at_most(vector_difference(&chosen[i], &whole[vertices[i]], 1), path_tolerance * size);
+                check_at_most(vector_difference(&chosen[i], &whole[vertices[i]], 1),
+                              path_tolerance * size);
             assert_int_equal(pliant_solver_tractions(f.solver, vertices, count, chosen), PLIANT_OK);
             for (int32_t i = 0; i < count; i++)
                 check_at_most(vector_difference(&chosen[i], &reactions[vertices[i]], 1),
@@ -351,7 +362,8 @@ static void a_coarser_surface_is_the_partial_inverse(void **state)
         const int32_t level = levels[k];
         memset(x, 0, 3 * ((size_t)w->count + 1) * sizeof *x);
         for (int32_t i = 0; i < w->count; i++)
-            for (int c = 0; c < 3; c++) x[3 * (size_t)i + c] = u[3 * (size_t)f.exact->nodes[0][i] + c];
+            for (int c = 0; c < 3; c++)
+                x[3 * (size_t)i + c] = u[3 * (size_t)f.exact->nodes[0][i] + c];
         pliant_wavelet_forward(w, 3, x);
         pliant_wavelet_inverse(w, level, 3, x);
         memset(found, 0x5a, (size_t)f.n * sizeof *found);
@@ -388,8 +400,8 @@ static void cached_types_repeat_to_the_bit_in_any_order_of_statements(void **sta
         for (int32_t i = 0; i < 4; i++) {
             const int32_t which = k < 3 ? i : 3 - i;
             const pliant_vec3 u = {0, 0.01f * (float)which, -0.1f};
-            assert_int_equal(
-                pliant_solver_displace(f.solver, node_of(&f, patch[k % 3][which]), u), PLIANT_OK);
+            assert_int_equal(pliant_solver_displace(f.solver, node_of(&f, patch[k % 3][which]), u),
+                             PLIANT_OK);
         }
         assert_int_equal(pliant_solver_constraint_count(f.solver), 4);
         assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
@@ -421,7 +433,8 @@ static void a_coherent_walk_of_100000_steps_does_not_drift(void **state)
     (void)state;
     fixture f = set_up(1, 0, pliant_wavelet_default(), CHECK_ALL_BLOCKS, roomy);
     check_random random = check_random_seed(8);
-    pliant_vec3 *walked = calloc((size_t)f.n, sizeof *walked), *fresh = calloc((size_t)f.n, sizeof *fresh);
+    pliant_vec3 *walked = calloc((size_t)f.n, sizeof *walked),
+                *fresh = calloc((size_t)f.n, sizeof *fresh);
     check_problem problem = check_problem_create(f.exact);
     double worst = 0;
     for (int32_t step = 0; step < 100000; step++) {
@@ -468,18 +481,21 @@ static void a_coherent_walk_of_100000_steps_does_not_drift(void **state)
             if (displaced != !pliant_model_is_free(f.model, w) || vector_size(&value, 1) > 0)
                 specify(&f, &ignored, w, displaced, value);
         }
-        const pliant_vec3 g = {(float)problem.gravity[0], (float)problem.gravity[1], (float)problem.gravity[2]};
+        const pliant_vec3 g = {(float)problem.gravity[0], (float)problem.gravity[1],
+                               (float)problem.gravity[2]};
         assert_int_equal(pliant_solver_gravity(other, g), PLIANT_OK);
         assert_true(pliant_solver_solve(other) >= 0);
         assert_int_equal(pliant_solver_surface(other, f.finest, fresh), PLIANT_OK);
         f.solver = kept;
         assert_int_equal(pliant_solver_surface(kept, f.finest, walked), PLIANT_OK);
-        worst = fmax(worst, vector_difference(walked, fresh, f.n) / fmax(vector_size(fresh, f.n), 1e-30));
+        worst = fmax(worst,
+                     vector_difference(walked, fresh, f.n) / fmax(vector_size(fresh, f.n), 1e-30));
         check_problem_destroy(&ignored);
         pliant_solver_destroy(other);
     }
     print_message("worst relative drift %.2g\n", worst);
-    // The base is summed afresh before its drift bound passes 256 u = 1.5e-5 of the loads' magnitude.
+    // The base is summed afresh before its drift bound passes 256 u = 1.5e-5 of the loads'
+    // magnitude.
     check_at_most(worst, 256 * 0x1p-24);
     check_problem_destroy(&problem);
     free(walked);

@@ -33,11 +33,10 @@ static void *run_walk(void *argument)
         const pliant_vec3 value = {0.1f, (float)check_random_next(&random), -0.1f};
         const pliant_node node = {2, v};
         if (step % 16 == 0) pliant_solver_release_all(solver);
-        const pliant_status status = check_random_next(&random) < 0.6
-                                         ? pliant_solver_press(solver, node, value)
-                                     : pliant_model_is_free(w->model, v)
-                                         ? pliant_solver_displace(solver, node, value)
-                                         : pliant_solver_support(solver, node, value);
+        const pliant_status status =
+            check_random_next(&random) < 0.6    ? pliant_solver_press(solver, node, value)
+            : pliant_model_is_free(w->model, v) ? pliant_solver_displace(solver, node, value)
+                                                : pliant_solver_support(solver, node, value);
         pliant_vec3 u[vertex_limit], p[vertex_limit];
         w->failed |= status < 0 && status != PLIANT_ERR_CAPACITY;
         w->failed |= pliant_solver_solve(solver) < 0;
@@ -45,7 +44,8 @@ static void *run_walk(void *argument)
         w->failed |= pliant_solver_surface(solver, 2, u) < 0;
         w->failed |= pliant_solver_tractions(solver, NULL, vertex_limit, p) < 0;
         for (int32_t i = 0; i < vertex_limit; i++)
-            w->sum[i].x += u[i].x + p[i].x, w->sum[i].y += u[i].y + p[i].y, w->sum[i].z += u[i].z + p[i].z;
+            w->sum[i].x += u[i].x + p[i].x, w->sum[i].y += u[i].y + p[i].y,
+                w->sum[i].z += u[i].z + p[i].z;
     }
     pliant_solver_destroy(solver);
     return NULL;

@@ -92,7 +92,8 @@ static void bad_nodes_and_values_are_refused_without_effect(void **state)
     assert_int_equal(pliant_solver_press(solver, node(free_vertex[9]), side), PLIANT_OK);
     const picture before = take_picture(solver);
 
-    const pliant_node bad[] = {{2, -1}, {2, n}, {2, INT32_MAX}, {-1, 0}, {3, 0}, {INT32_MIN, 0}, {0, 12}, {1, 42}};
+    const pliant_node bad[] = {{2, -1}, {2, n},         {2, INT32_MAX}, {-1, 0},
+                               {3, 0},  {INT32_MIN, 0}, {0, 12},        {1, 42}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         assert_int_equal(pliant_solver_displace(solver, bad[i], down), PLIANT_ERR_ARGUMENT);
         assert_int_equal(pliant_solver_press(solver, bad[i], down), PLIANT_ERR_ARGUMENT);
@@ -108,13 +109,18 @@ static void bad_nodes_and_values_are_refused_without_effect(void **state)
     }
     const pliant_vec3 wrong[] = {{NAN, 0, 0}, {0, INFINITY, 0}, {0, 0, -INFINITY}};
     for (int i = 0; i < 3; i++) {
-        assert_int_equal(pliant_solver_displace(solver, node(free_vertex[0]), wrong[i]), PLIANT_ERR_ARGUMENT);
-        assert_int_equal(pliant_solver_press(solver, node(free_vertex[0]), wrong[i]), PLIANT_ERR_ARGUMENT);
-        assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[0]), wrong[i]), PLIANT_ERR_ARGUMENT);
+        assert_int_equal(pliant_solver_displace(solver, node(free_vertex[0]), wrong[i]),
+                         PLIANT_ERR_ARGUMENT);
+        assert_int_equal(pliant_solver_press(solver, node(free_vertex[0]), wrong[i]),
+                         PLIANT_ERR_ARGUMENT);
+        assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[0]), wrong[i]),
+                         PLIANT_ERR_ARGUMENT);
         assert_int_equal(pliant_solver_gravity(solver, wrong[i]), PLIANT_ERR_ARGUMENT);
     }
-    assert_int_equal(pliant_solver_displace(solver, node(fixed_vertex[0]), down), PLIANT_ERR_ARGUMENT);
-    assert_int_equal(pliant_solver_support(solver, node(free_vertex[0]), down), PLIANT_ERR_ARGUMENT);
+    assert_int_equal(pliant_solver_displace(solver, node(fixed_vertex[0]), down),
+                     PLIANT_ERR_ARGUMENT);
+    assert_int_equal(pliant_solver_support(solver, node(free_vertex[0]), down),
+                     PLIANT_ERR_ARGUMENT);
     const picture after = take_picture(solver);
     check_same(&before, &after);
     pliant_solver_destroy(solver);
@@ -154,7 +160,8 @@ static void without_the_fixed_blocks_supports_are_missing(void **state)
     assert_int_equal(pliant_solver_displace(solver, node(free_vertex[3]), down), PLIANT_OK);
     const picture before = take_picture(solver);
     assert_int_equal(pliant_model_describe(models[1]).has_supports, 0);
-    assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[0]), down), PLIANT_ERR_MISSING);
+    assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[0]), down),
+                     PLIANT_ERR_MISSING);
     assert_int_equal(pliant_solver_press(solver, node(fixed_vertex[0]), down), PLIANT_ERR_MISSING);
     assert_int_equal(pliant_solver_release(solver, node(fixed_vertex[0])), PLIANT_OK);
     const picture after = take_picture(solver);
@@ -171,12 +178,15 @@ static void capacities_are_refused_and_come_free_again(void **state)
     for (int i = 3; i < 5; i++)
         assert_int_equal(pliant_solver_press(solver, node(free_vertex[i]), side), PLIANT_OK);
     const picture before = take_picture(solver);
-    assert_int_equal(pliant_solver_displace(solver, node(free_vertex[7]), down), PLIANT_ERR_CAPACITY);
+    assert_int_equal(pliant_solver_displace(solver, node(free_vertex[7]), down),
+                     PLIANT_ERR_CAPACITY);
     assert_int_equal(pliant_solver_press(solver, node(fixed_vertex[1]), down), PLIANT_ERR_CAPACITY);
     assert_int_equal(pliant_solver_press(solver, node(free_vertex[7]), down), PLIANT_ERR_CAPACITY);
-    assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[1]), down), PLIANT_ERR_CAPACITY);
+    assert_int_equal(pliant_solver_support(solver, node(fixed_vertex[1]), down),
+                     PLIANT_ERR_CAPACITY);
     // Moves into a full list leave the node where it was.
-    assert_int_equal(pliant_solver_displace(solver, node(free_vertex[3]), down), PLIANT_ERR_CAPACITY);
+    assert_int_equal(pliant_solver_displace(solver, node(free_vertex[3]), down),
+                     PLIANT_ERR_CAPACITY);
     assert_int_equal(pliant_solver_press(solver, node(free_vertex[0]), down), PLIANT_ERR_CAPACITY);
     const picture after = take_picture(solver);
     check_same(&before, &after);
@@ -187,10 +197,13 @@ static void capacities_are_refused_and_come_free_again(void **state)
     for (int round = 0; round < 50; round++) {
         pliant_solver_release_all(solver);
         for (int i = 0; i < 3; i++)
-            assert_int_equal(pliant_solver_displace(solver, node(free_vertex[round + i]), down), PLIANT_OK);
+            assert_int_equal(pliant_solver_displace(solver, node(free_vertex[round + i]), down),
+                             PLIANT_OK);
         for (int i = 0; i < 2; i++)
-            assert_int_equal(pliant_solver_press(solver, node(free_vertex[round + 20 + i]), down), PLIANT_OK);
-        assert_int_equal(pliant_solver_press(solver, node(free_vertex[round + 25]), down), PLIANT_ERR_CAPACITY);
+            assert_int_equal(pliant_solver_press(solver, node(free_vertex[round + 20 + i]), down),
+                             PLIANT_OK);
+        assert_int_equal(pliant_solver_press(solver, node(free_vertex[round + 25]), down),
+                         PLIANT_ERR_CAPACITY);
         if (round % 3 == 0) assert_true(pliant_solver_solve(solver) >= 0);
     }
     pliant_solver_destroy(solver);
@@ -211,7 +224,8 @@ static void the_last_statement_about_a_vertex_holds(void **state)
     assert_int_equal(pliant_solver_press(other, node(c), side), PLIANT_OK);
     assert_int_equal(pliant_solver_constraint_count(other), 2);
     assert_true(pliant_solver_solve(other) >= 0);
-    assert_int_equal(pliant_solver_release(other, node(free_vertex[50])), PLIANT_OK);  // nothing there
+    assert_int_equal(pliant_solver_release(other, node(free_vertex[50])),
+                     PLIANT_OK);  // nothing there
     assert_int_equal(pliant_solver_displace(other, node(a), down), PLIANT_OK);
     assert_int_equal(pliant_solver_press(other, node(b), side), PLIANT_OK);
     assert_int_equal(pliant_solver_support(other, node(c), side), PLIANT_OK);
@@ -239,7 +253,8 @@ static void statements_show_only_after_the_next_solve(void **state)
     pliant_solver *solver = create(0, 8, 8);
     const int32_t asked[3] = {free_vertex[10], fixed_vertex[2], free_vertex[40]};
     pliant_vec3 u[3], p[3], u_later[3], p_later[3];
-    assert_int_equal(pliant_solver_displacements(solver, asked, 3, u), PLIANT_OK);  // before any solve
+    assert_int_equal(pliant_solver_displacements(solver, asked, 3, u),
+                     PLIANT_OK);  // before any solve
     for (int i = 0; i < 3; i++) assert_memory_equal(&u[i], &zero, sizeof zero);
     assert_int_equal(pliant_solver_displace(solver, node(asked[0]), down), PLIANT_OK);
     assert_int_equal(pliant_solver_support(solver, node(asked[1]), side), PLIANT_OK);
@@ -248,7 +263,8 @@ static void statements_show_only_after_the_next_solve(void **state)
     assert_int_equal(pliant_solver_displacements(solver, asked, 3, u), PLIANT_OK);
     assert_int_equal(pliant_solver_tractions(solver, asked, 3, p), PLIANT_OK);
     const pliant_vec3 force = pliant_solver_contact_force(solver);
-    check_near(force.z, pliant_model_area(models[0], asked[0]) * (double)p[0].z, 1e-6 * fabs(force.z));
+    check_near(force.z, pliant_model_area(models[0], asked[0]) * (double)p[0].z,
+               1e-6 * fabs(force.z));
     pliant_solver_release_all(solver);
     assert_int_equal(pliant_solver_press(solver, node(asked[0]), side), PLIANT_OK);
     assert_int_equal(pliant_solver_displacements(solver, asked, 3, u_later), PLIANT_OK);
@@ -263,11 +279,13 @@ static void statements_show_only_after_the_next_solve(void **state)
 static void bad_definitions_are_refused(void **state)
 {
     (void)state;
-    const pliant_solver_def bad[] = {{0, 8, 1},  {-5, 8, 1}, {8, -1, 1}, {8, 8, 0}, {8, 8, -1}, {8, 8, INT32_MAX}};
+    const pliant_solver_def bad[] = {{0, 8, 1}, {-5, 8, 1}, {8, -1, 1},
+                                     {8, 8, 0}, {8, 8, -1}, {8, 8, INT32_MAX}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         pliant_solver *solver = NULL;
         pliant_error err = {""};
-        assert_int_equal(pliant_solver_create(models[0], &bad[i], &solver, &err), PLIANT_ERR_ARGUMENT);
+        assert_int_equal(pliant_solver_create(models[0], &bad[i], &solver, &err),
+                         PLIANT_ERR_ARGUMENT);
         assert_null(solver);
         assert_true(err.text[0] != 0);
     }

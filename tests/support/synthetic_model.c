@@ -17,8 +17,8 @@ extern void dgemm_(const char *ta, const char *tb, const int *m, const int *n, c
                    const double *alpha, const double *a, const int *lda, const double *b,
                    const int *ldb, const double *beta, double *c, const int *ldc);
 
-// OpenBLAS's own threads are invisible to ThreadSanitizer, and small test matrices gain nothing from
-// them. NULL with another BLAS.
+// OpenBLAS's own threads are invisible to ThreadSanitizer, and small test matrices gain nothing
+// from them. NULL with another BLAS.
 extern void openblas_set_num_threads(int count) __attribute__((weak));
 
 static void *take(size_t count, size_t size)
@@ -447,11 +447,11 @@ void check_synthetic_write_dense(const check_synthetic *s, const char *path)
     check_ok(pliant_writer_commit(writer, &err), &err);
 }
 
-void check_write_synthetic_model(const char *path, const char *dense_path, int32_t levels, double eps,
-                                 pliant_wavelet_def wavelet, check_blocks blocks)
+void check_write_synthetic_model(const char *path, const char *dense_path, int32_t levels,
+                                 double eps, pliant_wavelet_def wavelet, check_blocks blocks)
 {
-    check_synthetic *s = check_synthetic_create(&(check_synthetic_def){
-        .levels = levels, .eps = eps, .wavelet = wavelet, .blocks = blocks});
+    check_synthetic *s = check_synthetic_create(
+        &(check_synthetic_def){.levels = levels, .eps = eps, .wavelet = wavelet, .blocks = blocks});
     check_synthetic_write(s, path);
     if (dense_path) check_synthetic_write_dense(s, dense_path);
     check_synthetic_destroy(s);
@@ -475,7 +475,8 @@ void check_problem_destroy(check_problem *problem)
 }
 
 // K u = a p + b g on the traction-specified nodes t, with u of the others d on the right-hand side.
-void check_synthetic_solve(const check_synthetic *s, const check_problem *problem, double *u, double *p)
+void check_synthetic_solve(const check_synthetic *s, const check_problem *problem, double *u,
+                           double *p)
 {
     assert_non_null(s->stiffness);
     const int32_t n = s->surface.mesh->vertex_count;

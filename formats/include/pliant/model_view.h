@@ -10,13 +10,13 @@
 
 // The columns of one level of one block: wavelet coefficients of the row domain (FORMULAS 3).
 typedef struct pliant_greens_view {
-    int32_t row_count;             // positions of the row domain: m or k
-    int32_t column_count;          // column c belongs to position c of the column domain
-    uint64_t nnz;                  // stored blocks
-    const uint64_t *column_offset; // shape [column_count + 1]; NULL: this level is not stored
-    const int32_t *row;            // shape [nnz], ascending within a column
-    const float *block;            // shape [nnz][3][3]: component r per unit component c
-    const double *summary;         // shape [PLIANT_SUMMARY_COUNT]
+    int32_t row_count;              // positions of the row domain: m or k
+    int32_t column_count;           // column c belongs to position c of the column domain
+    uint64_t nnz;                   // stored blocks
+    const uint64_t *column_offset;  // shape [column_count + 1]; NULL: this level is not stored
+    const int32_t *row;             // shape [nnz], ascending within a column
+    const float *block;             // shape [nnz][3][3]: component r per unit component c
+    const double *summary;          // shape [PLIANT_SUMMARY_COUNT]
 } pliant_greens_view;
 
 typedef struct pliant_model_view {
@@ -41,7 +41,7 @@ typedef struct pliant_model_view {
     const int32_t *fixed_level_offset;  // [L + 2]
     const float *gravity_free;          // [m][3][3], transformed, per unit acceleration
     const float *gravity_fixed;         // [k][3][3]; NULL without supports
-    const unsigned char *provenance;    // [provenance_bytes], "key = value" lines, no NUL at the end
+    const unsigned char *provenance;  // [provenance_bytes], "key = value" lines, no NUL at the end
 
     pliant_greens_view greens[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
 } pliant_model_view;

@@ -15,12 +15,12 @@ typedef struct pliant_section {
     const char *path;
     pliant_section_type type;
     int32_t rank;
-    uint64_t shape[3];   // 1 beyond the rank
-    uint64_t count;      // elements: the product of shape
+    uint64_t shape[3];  // 1 beyond the rank
+    uint64_t count;     // elements: the product of shape
     uint64_t bytes;
-    uint64_t offset;     // in the file; 0 when there are no elements
-    uint32_t checksum;   // CRC-32C of the bytes
-    const void *data;    // never NULL, even when there is nothing to read
+    uint64_t offset;    // in the file; 0 when there are no elements
+    uint32_t checksum;  // CRC-32C of the bytes
+    const void *data;   // never NULL, even when there is nothing to read
 } pliant_section;
 
 PLIANT_UNUSED_RESULT pliant_status pliant_reader_open(const char *path, pliant_reader **reader,

@@ -62,7 +62,8 @@ PLIANT_UNUSED_RESULT pliant_status pliant_script_open(const char *path, pliant_s
 void pliant_script_close(pliant_script *script);
 
 // Read on to the next statement that is not blank. *more is 0 at the end of the script. Refusals
-// read "name:line:column: expected ..., found ..." and leave the parser at the next line.
+// read "name:line:column: expected ..., found ..." and leave the parser at the next line, with *more
+// 1; when the stream itself fails, the status is PLIANT_ERR_IO and *more 0.
 PLIANT_UNUSED_RESULT pliant_status pliant_script_next(pliant_script *script,
                                                       pliant_statement *statement, int *more,
                                                       pliant_error *err);

@@ -1,7 +1,7 @@
 // sections.h: what a model file and a dense file consist of: one table, read by everybody.
 //
-// The tables below are expanded by the layouts (for writers), the views (for readers), their checks,
-// the tests and the fuzzer. A change of the format is a row here and a step of
+// The tables below are expanded by the layouts (for writers), the views (for readers), their
+// checks, the tests and the fuzzer. A change of the format is a row here and a step of
 // PLIANT_FORMAT_VERSION. The meaning of every section is in formats/README.md.
 #pragma once
 
@@ -127,7 +127,7 @@ typedef struct pliant_section_def {
     uint64_t shape[3];  // 1 beyond the rank
 } pliant_section_def;
 
-size_t pliant_section_type_size(pliant_section_type type);        // 0 for an unknown one
+size_t pliant_section_type_size(pliant_section_type type);       // 0 for an unknown one
 const char *pliant_section_type_text(pliant_section_type type);  // "f4", ...; static
 
 // Path of a level's section, such as "/greens/free-free/level4/row"; `name` may be NULL: the group.

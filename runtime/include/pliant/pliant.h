@@ -1,9 +1,11 @@
-// pliant.h: precomputed elastic solids in real time. C11; needs libc, libm and LAPACK.
+// pliant.h: precomputed elastic solids in real time. C11; needs libc and libm.
 //
-// Arrays follow the file's vertex order (coarse to fine: the vertices of level l are 0 .. |K(l)|-1).
-// A pliant_model is a read-only mmap that threads may share; a pliant_solver has one user at a time.
-// Only open and create allocate: nothing called per frame allocates, locks or prints. Lengths,
-// forces and so on are in the units that the model was precomputed with; comments write m, N.
+// Arrays follow the file's vertex order (coarse to fine: the vertices of level l are 0 ..
+// |K(l)|-1). A pliant_model is a read-only mmap that threads may share; a pliant_solver has one
+// user at a time. Only open and create allocate: nothing called per frame allocates, locks, prints
+// or wakes threads. Lengths, forces and so on are in the units that the model was precomputed with;
+// comments write m, N. A status below 0 has had no effect, neither on the object nor on the
+// outputs.
 //
 // GF-n: D. L. James and D. K. Pai, Multiresolution Green's Function Methods for Interactive
 // Simulation of Large-scale Elastostatic Objects, ACM TOG 22(1), 2003.
@@ -11,7 +13,7 @@
 
 #include "pliant/base.h"
 
-typedef struct pliant_model pliant_model;    // one file: mesh, material, compressed Green's functions
+typedef struct pliant_model pliant_model;  // one file: mesh, material, compressed Green's functions
 typedef struct pliant_solver pliant_solver;  // one boundary value problem on a model
 
 // ---- Model ----
@@ -25,14 +27,14 @@ PLIANT_API void pliant_model_close(pliant_model *model);  // after its solvers; 
 PLIANT_CALL pliant_status pliant_model_verify(const pliant_model *model, pliant_error *err);
 
 typedef struct pliant_model_info {
-    int32_t vertex_count;    // n
+    int32_t vertex_count;  // n
     int32_t face_count;
-    int32_t level_count;     // L + 1
-    int32_t free_count;      // m, vertices whose displacement the reference problem leaves free
-    int32_t fixed_count;     // vertices that it holds
+    int32_t level_count;  // L + 1
+    int32_t free_count;   // m, vertices whose displacement the reference problem leaves free
+    int32_t fixed_count;  // vertices that it holds
     double young, poisson, density;  // Pa, -, kg/m^3
     double rms, max, factor;  // of the free-free block: GF-70, GF-71, dense blocks / kept blocks
-    int32_t has_supports;    // 1: fixed columns and rows are stored (--blocks all)
+    int32_t has_supports;     // 1: fixed columns and rows are stored (--blocks all)
 } pliant_model_info;
 PLIANT_API pliant_model_info pliant_model_describe(const pliant_model *model);
 
@@ -44,23 +46,25 @@ PLIANT_API const double *pliant_model_positions(const pliant_model *model);
 PLIANT_API const int32_t *pliant_model_faces(const pliant_model *model, int32_t level);
 // Vertex of the model that is vertex `source` of the input mesh, or -1.
 PLIANT_API int32_t pliant_model_from_source(const pliant_model *model, int32_t source);
-PLIANT_API int32_t pliant_model_is_free(const pliant_model *model, int32_t vertex);  // 1, 0; -1 out of range
-PLIANT_API double pliant_model_area(const pliant_model *model, int32_t vertex);      // a_i, m^2 (GF-4)
+PLIANT_API int32_t pliant_model_is_free(const pliant_model *model,
+                                        int32_t vertex);  // 1, 0; -1 out of range
+PLIANT_API double pliant_model_area(const pliant_model *model, int32_t vertex);  // a_i, m^2 (GF-4)
 // Free vertex whose rest position is nearest to `position` (shape [3], m).
 PLIANT_API int32_t pliant_model_nearest(const pliant_model *model, const double *position);
 
 // ---- Solver ----
 
 // A basis function: vertex `vertex` seen on level `level` (GF-51); on the finest level, L, the
-// vertex itself.
+// vertex itself. Nodes of levels that the file has no columns for are PLIANT_ERR_MISSING; today
+// that is all but L.
 typedef struct pliant_node {
     int32_t level, vertex;
 } pliant_node;
 
 typedef struct pliant_solver_def {
     int32_t constraint_capacity;  // s: the capacitance matrix (GF-19) is 3s x 3s. Default 64
-    int32_t load_capacity;        // nodes with a specified traction or support displacement. Default 256
-    int32_t cache_count;          // boundary-value-problem types whose inverse is kept. Default 4
+    int32_t load_capacity;  // nodes with a specified traction or support displacement. Default 256
+    int32_t cache_count;    // boundary-value-problem types whose inverse is kept. Default 4
 } pliant_solver_def;
 PLIANT_API pliant_solver_def pliant_solver_default(const pliant_model *model);
 PLIANT_CALL pliant_status pliant_solver_create(const pliant_model *model,
@@ -68,27 +72,45 @@ PLIANT_CALL pliant_status pliant_solver_create(const pliant_model *model,
                                                pliant_error *err);
 PLIANT_API void pliant_solver_destroy(pliant_solver *solver);  // NULL is fine
 
-// Statements change the state and cost next to nothing; solve does the work. Displace prescribes the
-// displacement of a free vertex (its type changes: CMA). Press prescribes the traction of a free
-// vertex, or frees a fixed one and loads it. Support prescribes a fixed vertex's displacement.
-PLIANT_CALL pliant_status pliant_solver_displace(pliant_solver *solver, pliant_node node, pliant_vec3 u);  // m
-PLIANT_CALL pliant_status pliant_solver_press(pliant_solver *solver, pliant_node node, pliant_vec3 p);     // N/m^2
-PLIANT_CALL pliant_status pliant_solver_support(pliant_solver *solver, pliant_node node, pliant_vec3 u);   // m
-PLIANT_CALL pliant_status pliant_solver_gravity(pliant_solver *solver, pliant_vec3 acceleration);          // m/s^2
-PLIANT_CALL pliant_status pliant_solver_release(pliant_solver *solver, pliant_node node);  // back to the reference condition
+// Statements change the state and cost next to nothing; solve does the work, and what is read stays
+// that of the last solve until the next. The last statement about a vertex holds; their order does
+// not matter otherwise. Displace prescribes the displacement of a free vertex (its type changes:
+// CMA). Press prescribes the traction of a free vertex, or frees a fixed one and loads it. Support
+// prescribes a fixed vertex's displacement. The latter two on fixed vertices need the fixed blocks
+// (has_supports; else PLIANT_ERR_MISSING). PLIANT_ERR_ARGUMENT: no such node, a number that is not
+// finite, displace on a fixed vertex, support on a free one. PLIANT_ERR_CAPACITY: the definition's
+// room for constraints or loads is taken.
+PLIANT_CALL pliant_status pliant_solver_displace(pliant_solver *solver, pliant_node node,
+                                                 pliant_vec3 u);  // m
+PLIANT_CALL pliant_status pliant_solver_press(pliant_solver *solver, pliant_node node,
+                                              pliant_vec3 p);  // N/m^2
+PLIANT_CALL pliant_status pliant_solver_support(pliant_solver *solver, pliant_node node,
+                                                pliant_vec3 u);  // m
+PLIANT_CALL pliant_status pliant_solver_gravity(pliant_solver *solver,
+                                                pliant_vec3 acceleration);  // m/s^2
+PLIANT_CALL pliant_status
+pliant_solver_release(pliant_solver *solver, pliant_node node);  // back to the reference condition
 PLIANT_API void pliant_solver_release_all(pliant_solver *solver);  // gravity too
-PLIANT_API int32_t pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose type is changed
+PLIANT_API int32_t
+pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose type is changed
 
 // Solve for the present state (GF-42..45): afterwards tractions and forces at constraints are known
-// and any part of the surface can be read. PLIANT_ROUGH: the compressed capacitance matrix of this
-// patch is not positive definite; finite, but forces are unreliable (use a model with a smaller MAX).
+// and any part of the surface can be read. Does not refuse. PLIANT_ROUGH: the compressed
+// capacitance matrix of this patch is not positive definite; finite, displacements at S as
+// specified, but forces are unreliable (use a model with a smaller MAX). A set of nodes that no
+// kept type has costs a factorisation: about 54 s^3 operations; the report tells.
 PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver);
 
-// Displacements of the whole surface up to `level` (GF-46, 47): u[level_vertex_count], m.
-PLIANT_CALL pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant_vec3 *u);
-// Chosen vertices only: the cost follows count, not mesh size (GF 3.2.4). NULL: 0 .. count-1.
-PLIANT_CALL pliant_status pliant_solver_displacements(pliant_solver *solver, const int32_t *vertices,
-                                                      int32_t count, pliant_vec3 *u);  // u[count], m
+// Displacements of the whole surface up to `level` (GF-46, 47): u[level_vertex_count], m. Exact
+// where displaced or supported, on every level. Another level after the same solve costs a new
+// summation.
+PLIANT_CALL pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level,
+                                                pliant_vec3 *u);
+// Chosen vertices only: the cost follows count, not mesh size (GF 3.2.4). NULL: 0 .. count-1. The
+// same vertices every frame are the fast case, since how to reach them is remembered.
+PLIANT_CALL pliant_status pliant_solver_displacements(pliant_solver *solver,
+                                                      const int32_t *vertices, int32_t count,
+                                                      pliant_vec3 *u);  // u[count], m
 // Tractions of chosen vertices: specified or solved for at free ones; reactions at fixed ones
 // (PLIANT_ERR_MISSING without fixed rows). p[count], N/m^2.
 PLIANT_CALL pliant_status pliant_solver_tractions(pliant_solver *solver, const int32_t *vertices,
@@ -98,13 +120,13 @@ PLIANT_API pliant_vec3 pliant_solver_contact_force(const pliant_solver *solver);
 
 // What the last solve did and took; times are monotonic nanoseconds.
 typedef struct pliant_solver_report {
-    int32_t constraint_count;   // s
-    int32_t level;              // constraint level used
-    int32_t factored;           // 1: a new boundary-value-problem type was factored, 0: found in the cache
-    int32_t summed_columns;     // columns added because they changed (GF-11)
-    int64_t capacitance_ns;     // assembling and factoring C
-    int64_t contact_ns;         // q = E^T W^-1 g - E^T vbar, then C^-1 q
-    int64_t summation_ns;       // sparse sums
-    int64_t surface_ns;         // last pliant_solver_surface
+    int32_t constraint_count;  // s
+    int32_t level;             // constraint level used
+    int32_t factored;  // 1: a new boundary-value-problem type was factored, 0: found in the cache
+    int32_t summed_columns;  // columns added because they changed (GF-11)
+    int64_t capacitance_ns;  // assembling and factoring C
+    int64_t contact_ns;      // q = E^T W^-1 g - E^T vbar, then C^-1 q
+    int64_t summation_ns;    // sparse sums
+    int64_t surface_ns;      // last pliant_solver_surface, whenever it was
 } pliant_solver_report;
 PLIANT_API pliant_solver_report pliant_solver_last(const pliant_solver *solver);

@@ -1,0 +1,407 @@
+// test_precompute.c: pliant-precompute from the outside: files, ranks, refusals, interruptions.
+#include "check.h"
+#include "command.h"
+
+#include "pliant/dense_view.h"
+#include "pliant/mesh.h"
+#include "pliant/model_view.h"
+#include "pliant/wavelet.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static const char sample[] = "scripts/sample/whale.obj";
+static const char name[] = "pliant-precompute: ";
+
+// 162 vertices: a run takes a second.
+static const char small_run[] = "--subdivide 2 --fixed 'z<0.03' --young 50000 --poisson 0.4 --density 1000";
+
+static const char *in_folder(const char *file)
+{
+    static char paths[4][512];
+    static int turn;
+    char *path = paths[turn++ % 4];
+    snprintf(path, sizeof paths[0], "%s/%s", check_folder(), file);
+    return path;
+}
+
+// ---- A model file as nodal columns ----
+
+typedef struct opened {
+    pliant_reader *reader;
+    pliant_model_view view;
+    pliant_hierarchy *hierarchy;
+    pliant_wavelet *wavelets[2];  // rows of the free, of the fixed domain
+    double *areas;
+} opened;
+
+static opened open_model(const char *path)
+{
+    opened o = {0};
+    pliant_error err;
+    check_ok(pliant_reader_open(path, &o.reader, &err), &err);
+    check_ok(pliant_reader_verify(o.reader, &err), &err);
+    check_ok(pliant_model_view_bind(o.reader, &o.view, &err), &err);
+    const pliant_model_view *v = &o.view;
+    check_ok(pliant_hierarchy_create(v->level_count, v->level_vertex_count, v->face_count, v->faces,
+                                     v->parents, &o.hierarchy, &err), &err);
+    o.areas = malloc((size_t)v->vertex_count * sizeof *o.areas);
+    pliant_mesh_vertex_areas(v->vertex_count, v->vertices, v->face_count, v->faces, o.areas);
+    for (int d = 0; d < 2; d++) {
+        const double *s = v->greens[d ? PLIANT_FIXED_FREE : PLIANT_FREE_FREE][v->level_count - 1].summary;
+        if (!s) continue;
+        const pliant_wavelet_def def = {(pliant_wavelet_scheme)s[PLIANT_SUMMARY_WAVELET],
+                                        (pliant_wavelet_lifting)s[PLIANT_SUMMARY_LIFTED],
+                                        (pliant_wavelet_boundary)s[PLIANT_SUMMARY_BOUNDARY]};
+        check_ok(pliant_wavelet_create(o.hierarchy, o.areas, d ? v->fixed_nodes : v->free_nodes,
+                                       d ? v->fixed_count : v->free_count, &def, &o.wavelets[d], &err), &err);
+    }
+    return o;
+}
+
+static void close_model(opened *o)
+{
+    for (int d = 0; d < 2; d++) pliant_wavelet_destroy(o->wavelets[d]);
+    free(o->areas);
+    pliant_hierarchy_destroy(o->hierarchy);
+    pliant_reader_close(o->reader);
+}
+
+// Nodal values of one column, [m + 1][9]; the caller frees.
+static double *column_of(const opened *o, pliant_block_name block, int32_t column)
+{
+    const pliant_greens_view *g = &o->view.greens[block][o->view.level_count - 1];
+    const pliant_wavelet *w = o->wavelets[block == PLIANT_FIXED_FREE || block == PLIANT_FIXED_FIXED];
+    double *x = calloc(((size_t)w->count + 1) * 9, sizeof *x);
+    for (uint64_t q = g->column_offset[column]; q < g->column_offset[column + 1]; q++)
+        for (int e = 0; e < 9; e++) x[9 * g->row[q] + e] = g->block[9 * q + e];
+    pliant_wavelet_inverse(w, w->level_count - 1, 9, x);
+    return x;
+}
+
+static int32_t columns_of(const opened *o, pliant_block_name block)
+{
+    return block == PLIANT_FREE_FREE || block == PLIANT_FIXED_FREE ? o->view.free_count : o->view.fixed_count;
+}
+
+static int32_t rows_of(const opened *o, pliant_block_name block)
+{
+    return block == PLIANT_FREE_FREE || block == PLIANT_FREE_FIXED ? o->view.free_count : o->view.fixed_count;
+}
+
+// Largest difference of two models' columns, relative to each column's largest value.
+static double difference(const opened *a, const opened *b)
+{
+    double worst = 0;
+    for (int block = 0; block < PLIANT_BLOCK_COUNT; block++) {
+        if (!a->view.greens[block][a->view.level_count - 1].row) continue;
+        for (int32_t j = 0; j < columns_of(a, (pliant_block_name)block); j++) {
+            double *x = column_of(a, (pliant_block_name)block, j), *y = column_of(b, (pliant_block_name)block, j);
+            double peak = 0, off = 0;
+            for (int32_t i = 0; i < 9 * rows_of(a, (pliant_block_name)block); i++)
+                peak = fmax(peak, fabs(x[i])), off = fmax(off, fabs(x[i] - y[i]));
+            worst = fmax(worst, off / peak);
+            free(x), free(y);
+        }
+    }
+    return worst;
+}
+
+// ---- Cases ----
+
+static void help_version_and_misuse_have_their_exit_status(void **state)
+{
+    (void)state;
+    check_command c;
+    check_run(&c, "%s/pliant-precompute --help", check_build());
+    assert_int_equal(c.status, 0);
+    assert_non_null(strstr(c.output, "usage: mpirun"));
+    check_run(&c, "%s/pliant-precompute --version", check_build());
+    assert_int_equal(c.status, 0);
+    assert_non_null(strstr(c.output, "pliant-precompute 0."));
+    const struct {
+        const char *arguments, *part;
+    } misuses[] = {
+        {"--subdivde 2 a.obj -o b.h5", "unknown option --subdivde"},
+        {"-x a.obj -o b.h5", "unknown option -x"},
+        {"--young", "--young needs a value"},
+        {"--force=yes a.obj", "takes no value"},
+        {"--poisson 0.5 --fixed 'z<0' a.obj -o b.h5", "--poisson: expected a number over -1 and under 0.5, found 0.5"},
+        {"--poisson -1 --fixed 'z<0' a.obj -o b.h5", "--poisson"},
+        {"--young 0 a.obj", "--young: expected a number over 0"},
+        {"--eps banana a.obj", "--eps: expected a number, found 'banana'"},
+        {"--subdivide 1.5 a.obj", "--subdivide: expected a whole number"},
+        {"--scheme lop a.obj", "--scheme: expected loop, butterfly or midpoint, found 'lop'"},
+        {"--method fem a.obj", "--method: expected bem, found 'fem'"},
+        {"--eps 0.1 --rms 0.1 --fixed 'z<0' a.obj -o b.h5", "one kind"},
+        {"a.obj -o b.h5", "nothing holds the solid"},
+        {"--fixed 'z<0' a.obj", "expected -o"},
+        {"--fixed 'z<0' -o b.h5", "expected a MESH"},
+        {"--fixed 'z<0' -o b.h5 a.obj c.obj", "found also 'c.obj'"},
+        {"--fixed 'z<0' -o b.h5 --dense b.h5 a.obj", "same file"},
+    };
+    for (size_t i = 0; i < sizeof misuses / sizeof *misuses; i++) {
+        check_run(&c, "%s/pliant-precompute %s", check_build(), misuses[i].arguments);
+        assert_int_equal(c.status, 2);
+        check_one_line(&c, name, misuses[i].part);
+    }
+    // Several ranks say it once.
+    check_run(&c, "mpirun --quiet -n 3 %s/pliant-precompute --nonsense", check_build());
+    assert_int_equal(c.status, 2);
+    check_one_line(&c, name, "--nonsense");
+}
+
+static void refusals_name_what_and_why_and_leave_nothing(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("refused.h5");
+    const struct {
+        const char *arguments, *part;
+    } refusals[] = {
+        {"--fixed 'z<0' nowhere.obj", "nowhere.obj"},
+        {"--fixed 'z<' scripts/sample/whale.obj --subdivide 1", "--fixed: "},
+        {"--fixed 'z<-100' scripts/sample/whale.obj --subdivide 1", ""},
+        {"--fixed 'z<100' scripts/sample/whale.obj --subdivide 1", ""},
+        {"--fixed-list nowhere.txt scripts/sample/whale.obj --subdivide 1", "nowhere.txt"},
+        {"--fixed 'z<0.03' scripts/sample/whale.obj", "whale.obj: no subdivision connectivity"},
+        {"--fixed 'z<0.03' scripts/sample/whale.obj --subdivide 9", "GB"},
+        {"--fixed 'z<0.03' scripts/sample/whale.obj --subdivide 14", "GB"},
+    };
+    for (size_t i = 0; i < sizeof refusals / sizeof *refusals; i++) {
+        check_run(&c, "%s/pliant-precompute -q %s -o %s", check_build(), refusals[i].arguments, output);
+        if (c.status != 1) print_error("%s\n", refusals[i].arguments);
+        assert_int_equal(c.status, 1);
+        check_one_line(&c, name, refusals[i].part);
+        assert_int_not_equal(access(output, F_OK), 0);
+    }
+    check_run(&c, "%s/pliant-precompute -q %s %s -o /nowhere/at/all.h5", check_build(), small_run, sample);
+    assert_int_equal(c.status, 1);
+    check_one_line(&c, name, "/nowhere/at/all.h5");
+}
+
+// A held set that stops no rotation about one axis is not a support.
+static void two_held_vertices_are_refused(void **state)
+{
+    (void)state;
+    check_command c;
+    check_run(&c, "printf '0\\n1\\n' > %s; %s/pliant-precompute -q --subdivide 0 --fixed-list %s %s -o %s",
+              in_folder("two.txt"), check_build(), in_folder("two.txt"), sample, in_folder("two.h5"));
+    assert_int_equal(c.status, 1);
+    check_one_line(&c, name, "");
+}
+
+static void every_bad_mesh_is_refused_or_solved_never_worse(void **state)
+{
+    (void)state;
+    const char *folder = check_model_path("bad");
+    if (!folder) skip();
+    DIR *directory = opendir(folder);
+    assert_non_null(directory);
+    check_command c;
+    int refused = 0, solved = 0;
+    for (struct dirent *entry; (entry = readdir(directory));) {
+        if (entry->d_name[0] == '.' || strcmp(entry->d_name, "README.md") == 0) continue;
+        const char *output = in_folder("bad.h5");
+        // Held where it must be, refined not at all: what is left to refuse is the mesh.
+        check_run(&c, "%s/pliant-precompute -q --force --subdivide 0 --fixed 'any(x<0, y<0)' '%s/%s' -o %s",
+                  check_build(), folder, entry->d_name, output);
+        if (c.status == 0) {
+            solved++;
+            continue;
+        }
+        if (c.status != 1) print_error("%s: exit %d\n%s", entry->d_name, c.status, c.errors);
+        assert_int_equal(c.status, 1);
+        check_one_line(&c, name, "");
+        refused++;
+    }
+    closedir(directory);
+    print_message("%d refused, %d solved\n", refused, solved);
+    assert_true(refused >= 35 && solved >= 8);
+}
+
+static void existing_outputs_are_kept_unless_forced(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("kept.h5");
+    check_run(&c, "echo precious > %s; %s/pliant-precompute -q %s %s -o %s", output, check_build(), small_run, sample, output);
+    assert_int_equal(c.status, 1);
+    check_one_line(&c, name, "--force");
+    check_run(&c, "cat %s", output);
+    assert_string_equal(c.output, "precious\n");
+    check_run(&c, "%s/pliant-precompute -q --force %s %s -o %s", check_build(), small_run, sample, output);
+    assert_int_equal(c.status, 0);
+    opened o = open_model(output);
+    close_model(&o);
+}
+
+// Writes beyond the limit fail as on a full disk.
+static void a_full_disk_leaves_no_file_and_says_so(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("full.h5");
+    for (int blocks = 1; blocks < 600; blocks = 4 * blocks + 3) {
+        check_run(&c, "trap '' XFSZ; ulimit -f %d; %s/pliant-precompute -q %s %s -o %s", blocks, check_build(),
+                  small_run, sample, output);
+        assert_int_equal(c.status, 1);
+        check_one_line(&c, name, "");
+        assert_int_not_equal(access(output, F_OK), 0);
+    }
+    check_run(&c, "ls -A %s | grep -v std", check_folder());
+    assert_null(strstr(c.output, "full"));
+    assert_null(strstr(c.output, "spool"));
+}
+
+static void a_killed_run_leaves_nothing_under_the_outputs_name(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("killed.h5");
+    for (int milliseconds = 50; milliseconds < 1700; milliseconds = milliseconds * 3 / 2) {
+        check_run(&c, "rm -f %s; timeout -s KILL %d.%03d %s/pliant-precompute -q --force --subdivide 3 --fixed 'z<0.03' %s -o %s",
+                  output, milliseconds / 1000, milliseconds % 1000, check_build(), sample, output);
+        if (access(output, F_OK) != 0) continue;
+        // Whatever stands under the name is whole.
+        opened o = open_model(output);
+        close_model(&o);
+    }
+    check_run(&c, "%s/pliant-precompute -q --force %s %s -o %s", check_build(), small_run, sample, output);
+    assert_int_equal(c.status, 0);
+}
+
+static void one_two_and_three_ranks_write_the_same_model(void **state)
+{
+    (void)state;
+    check_command c;
+    opened models[4];
+    // The last: the distributed solver in place of the shared-memory one.
+    static const char *const launches[] = {"mpirun --quiet -n 1", "mpirun --quiet -n 2", "mpirun --quiet -n 3",
+                                           "PETSC_OPTIONS='-pliant_dense scalapack' mpirun --quiet -n 2"};
+    for (int i = 0; i < 4; i++) {
+        char output[512];
+        snprintf(output, sizeof output, "%s/ranks%d.h5", check_folder(), i);
+        check_run(&c, "%s %s/pliant-precompute -q --blocks all %s %s -o %s", launches[i], check_build(), small_run,
+                  sample, output);
+        if (c.status != 0) print_error("%s\n%s", launches[i], c.errors);
+        assert_int_equal(c.status, 0);
+        models[i] = open_model(output);
+        if (i == 0) continue;
+        assert_int_equal(pliant_reader_section_count(models[i].reader), pliant_reader_section_count(models[0].reader));
+        for (int32_t s = 0; s < pliant_reader_section_count(models[0].reader); s++)
+            assert_string_equal(pliant_reader_section(models[i].reader, s)->path,
+                                pliant_reader_section(models[0].reader, s)->path);
+        // Solutions differ by round-off times the condition number (under 1e4 here); a coefficient on
+        // the edge of its threshold would show as 1e-3 or more.
+        check_at_most(difference(&models[0], &models[i]), 1e-6);
+    }
+    for (int i = 0; i < 4; i++) close_model(&models[i]);
+}
+
+static void stored_columns_meet_their_errors_against_the_dense_file(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("exact.h5"), *dense = in_folder("dense.h5");
+    check_run(&c, "%s/pliant-precompute -q --blocks all --rms 0.01 --max 0.03 %s %s -o %s --dense %s", check_build(),
+              small_run, sample, output, dense);
+    assert_int_equal(c.status, 0);
+    opened o = open_model(output);
+    pliant_reader *reader = NULL;
+    pliant_dense_view d;
+    pliant_error err;
+    check_ok(pliant_reader_open(dense, &reader, &err), &err);
+    check_ok(pliant_dense_view_bind(reader, &d, &err), &err);
+    const double *const matrices[] = {d.free_free, d.free_fixed, d.fixed_free, d.fixed_fixed};
+    for (int block = 0; block < PLIANT_BLOCK_COUNT; block++) {
+        const int32_t rows = rows_of(&o, (pliant_block_name)block), columns = columns_of(&o, (pliant_block_name)block);
+        const double *summary = o.view.greens[block][o.view.level_count - 1].summary;
+        double error = 0, energy = 0, max = 0;
+        for (int32_t j = 0; j < columns; j++) {
+            double *x = column_of(&o, (pliant_block_name)block, j), largest = 0, peak = 0;
+            for (int32_t i = 0; i < rows; i++) {
+                double off = 0, square = 0;
+                for (int e = 0; e < 9; e++) {
+                    const double value = matrices[block][(3 * (size_t)i + e / 3) * 3 * columns + 3 * j + e % 3];
+                    off += (x[9 * i + e] - value) * (x[9 * i + e] - value), square += value * value;
+                }
+                error += off, energy += square;
+                largest = fmax(largest, off), peak = fmax(peak, square);
+            }
+            max = fmax(max, sqrt(largest / peak));
+            free(x);
+        }
+        // What the file says of itself, recomputed the slow way.
+        check_near(sqrt(error / energy), summary[PLIANT_SUMMARY_RMS], 2e-6);
+        check_near(max, summary[PLIANT_SUMMARY_MAX], 2e-6);
+        check_at_most(sqrt(error / energy), 0.01);
+        check_at_most(max, 0.03);
+    }
+    pliant_reader_close(reader);
+    close_model(&o);
+}
+
+static void source_numbers_follow_a_shuffled_mesh(void **state)
+{
+    (void)state;
+    const char *ordered = check_model_path("semireg/bob_L2.obj");
+    const char *shuffled = check_model_path("semireg/bob_L2_shuffled.obj");
+    if (!ordered || !shuffled) skip();
+    check_command c;
+    // Coarse targets: what is tested is numbering. 2480 vertices.
+    check_run(&c, "mpirun --quiet -n 2 %s/pliant-precompute -q --fixed 'z<-0.3' --eps 0.2 %s -o %s", check_build(), shuffled,
+              in_folder("shuffled.h5"));
+    if (c.status) print_error("%s", c.errors);
+    assert_int_equal(c.status, 0);
+    opened o = open_model(in_folder("shuffled.h5"));
+    assert_int_equal(o.view.level_count, 3);
+    assert_int_equal(o.view.level_vertex_count[0], 155);
+    // The model's vertex v is the file's vertex source_index[v].
+    FILE *file = fopen(shuffled, "r");
+    double (*positions)[3] = malloc(sizeof(double[3]) * (size_t)o.view.vertex_count);
+    char line[256];
+    for (int32_t v = 0; v < o.view.vertex_count && fgets(line, sizeof line, file);)
+        if (sscanf(line, "v %lf %lf %lf", &positions[v][0], &positions[v][1], &positions[v][2]) == 3) v++;
+    fclose(file);
+    for (int32_t v = 0; v < o.view.vertex_count; v++)
+        for (int e = 0; e < 3; e++) check_near(o.view.vertices[3 * v + e], positions[o.view.source_index[v]][e], 0);
+    free(positions);
+    close_model(&o);
+}
+
+static void json_summary_is_one_object(void **state)
+{
+    (void)state;
+    check_command c;
+    check_run(&c, "%s/pliant-precompute --json %s %s -o %s", check_build(), small_run, sample, in_folder("json.h5"));
+    assert_int_equal(c.status, 0);
+    assert_int_equal(c.output[0], '{');
+    assert_non_null(strstr(c.output, "\"free-free\": {\"kept\": "));
+    check_run(&c, "%s/pliant-precompute --json %s %s -o %s > /dev/full", check_build(), small_run, sample, in_folder("json2.h5"));
+    assert_int_equal(c.status, 1);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(help_version_and_misuse_have_their_exit_status),
+        cmocka_unit_test(refusals_name_what_and_why_and_leave_nothing),
+        cmocka_unit_test(two_held_vertices_are_refused),
+        cmocka_unit_test(every_bad_mesh_is_refused_or_solved_never_worse),
+        cmocka_unit_test(existing_outputs_are_kept_unless_forced),
+        cmocka_unit_test(a_full_disk_leaves_no_file_and_says_so),
+        cmocka_unit_test(a_killed_run_leaves_nothing_under_the_outputs_name),
+        cmocka_unit_test(one_two_and_three_ranks_write_the_same_model),
+        cmocka_unit_test(stored_columns_meet_their_errors_against_the_dense_file),
+        cmocka_unit_test(source_numbers_follow_a_shuffled_mesh),
+        cmocka_unit_test(json_summary_is_one_object),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
