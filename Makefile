@@ -208,7 +208,7 @@ TEST_LIBS := $(LIB_support) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_play) $(LIB_info
 $(OUT)/tests/precompute/%: $(OBJ)/tests/precompute/%.o $(LIB_support) $(LIB_precompute) $(LIB_pliant) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(CMOCKA_LIBS) $(ASSIMP_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/bench/%: $(OBJ)/tests/bench/%.o $(LIB_support) $(if $(HAVE_PETSC),$(LIB_precompute)) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
-	$(program) $(HDF5_LIBS) $(ASSIMP_LIBS) $(LAPACK_LIBS) -lm -lpthread
+	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(ASSIMP_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/%: $(OBJ)/tests/%.o $(TEST_LIBS)
 	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
 

@@ -93,7 +93,7 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
     write_bytes(pliant_description_level_bytes(g), size);
     fprintf(stream,
             "            %-11s  %5d  %7d  %9" PRIu64
-            "  %7s  %6.3gx  %7s  %7.2g  %7.2g  %s, %s, %s\n",
+            "  %7s  %6.3gx  %7s  %7.3g  %7.3g  %s, %s, %s\n",
             pliant_block_text(block), (int)level, (int)g->column_count, g->nnz, size,
             s[PLIANT_SUMMARY_FACTOR], eps, s[PLIANT_SUMMARY_RMS], s[PLIANT_SUMMARY_MAX],
             s[PLIANT_SUMMARY_WAVELET] == PLIANT_BUTTERFLY ? "butterfly" : "linear",

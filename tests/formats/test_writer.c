@@ -386,6 +386,7 @@ static int fail_halfway(void)
 static void disk_error_halfway_leaves_a_process_that_can_exit(void **state)
 {
     (void)state;
+    scratch("");  // the child shares the folder
     fflush(NULL);
     const pid_t child = fork();
     if (child == 0) exit(fail_halfway());  // exit, not _exit: HDF5's handlers would run here
@@ -398,6 +399,7 @@ static void disk_error_halfway_leaves_a_process_that_can_exit(void **state)
 static void file_size_limit_is_refused_wherever_it_strikes(void **state)
 {
     (void)state;
+    scratch("");  // the child shares the folder
     fflush(NULL);
     const pid_t child = fork();
     if (child == 0) _exit(write_under_limits());

@@ -9,14 +9,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// A path in this process's own folder under TMPDIR or /tmp; static, good until the 16th next call.
+// A path in this test's own folder under TMPDIR or /tmp; static, good until the 16th next call.
 static inline const char *scratch(const char *name)
 {
     static char paths[16][512];
-    static int next;
+    static int next, owner;
+    if (!owner) owner = (int)getpid();  // children of a test use its folder
     const char *folder = getenv("TMPDIR");
     char *path = paths[next++ % 16];
-    snprintf(path, sizeof paths[0], "%s/pliant-test-%d", folder ? folder : "/tmp", (int)getpid());
+    snprintf(path, sizeof paths[0], "%s/pliant-test-%d", folder ? folder : "/tmp", owner);
     mkdir(path, 0777);
     const size_t length = strlen(path);
     snprintf(path + length, sizeof paths[0] - length, "/%s", name);
