@@ -349,6 +349,42 @@ static void stored_columns_meet_their_errors_against_the_dense_file(void **state
     close_model(&o);
 }
 
+// Contact, tractions, moved supports, a freed support and gravity, all at once and one by one.
+static void a_model_without_loss_plays_as_its_dense_file(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *output = in_folder("lossless.h5"), *dense = in_folder("lossless-dense.h5");
+    check_run(&c, "mpirun --quiet -n 2 %s/pliant-precompute -q --blocks all --eps 1e-9 %s %s -o %s --dense %s",
+              check_build(), small_run, sample, output, dense);
+    assert_int_equal(c.status, 0);
+    opened o = open_model(output);
+    const int32_t *free_nodes = o.view.free_nodes, *fixed = o.view.fixed_nodes;
+    const int32_t m = o.view.free_count;
+    FILE *script = fopen(in_folder("all.script"), "w");
+    assert_non_null(script);
+    fprintf(script,
+            "pliant-script 1\n"
+            "gravity 0 0 -9.81\nstep\n"
+            "displace %d 0 0.001 -0.003\ndisplace %d 0.002 0 0\nstep\n"
+            "traction %d 10 20 -50\nforce %d 0.001 0 -0.002\nstep\n"
+            "support %d 0 0 0.002\nstep\n"
+            "traction %d 0 0 0\nstep\n"
+            "release %d\nstep\nrelease all\nstep\n",
+            free_nodes[0], free_nodes[m / 2], free_nodes[1], free_nodes[m - 1], fixed[0], fixed[1], free_nodes[0]);
+    fclose(script);
+    check_run(&c, "%s/pliant-play --json --compare %s %s %s", check_build(), dense, output, in_folder("all.script"));
+    if (c.status != 0) print_error("%s", c.errors);
+    assert_int_equal(c.status, 0);
+    const char *rms = strstr(c.output, "\"rms\":"), *force = strstr(c.output, "\"force_worst\":");
+    assert_non_null(rms);
+    assert_non_null(force);
+    // Floats hold 6e-8 of each column's scale; the contact matrix's condition is under a hundred here.
+    check_at_most(strtod(rms + 6, NULL), 1e-5);
+    check_at_most(strtod(force + 14, NULL), 1e-4);
+    close_model(&o);
+}
+
 static void source_numbers_follow_a_shuffled_mesh(void **state)
 {
     (void)state;
@@ -401,6 +437,7 @@ int main(void)
         cmocka_unit_test(a_killed_run_leaves_nothing_under_the_outputs_name),
         cmocka_unit_test(one_two_and_three_ranks_write_the_same_model),
         cmocka_unit_test(stored_columns_meet_their_errors_against_the_dense_file),
+        cmocka_unit_test(a_model_without_loss_plays_as_its_dense_file),
         cmocka_unit_test(source_numbers_follow_a_shuffled_mesh),
         cmocka_unit_test(json_summary_is_one_object),
     };
