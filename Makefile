@@ -194,7 +194,9 @@ $(OUT)/pliant-draw: $(OBJ)/runtime/draw/main.o $(LIB_draw) $(LIB_play) $(LIB_pli
 
 # ---- Tests, benchmarks, fuzzers ----
 
-TEST_SRC  := $(sort $(wildcard tests/common/test_*.c tests/formats/test_*.c tests/runtime/test_*.c tests/precompute/test_*.c tests/programs/test_*.c))
+# The longest first: they run side by side.
+LONG_TESTS := $(wildcard tests/precompute/test_models.c tests/programs/test_*.c)
+TEST_SRC  := $(LONG_TESTS) $(filter-out $(LONG_TESTS),$(sort $(wildcard tests/common/test_*.c tests/formats/test_*.c tests/runtime/test_*.c tests/precompute/test_*.c)))
 ifneq ($(HAVE_PETSC),yes)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif

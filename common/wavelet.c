@@ -37,20 +37,29 @@ typedef struct plan_arrays {
     int32_t *update_offset;
     int32_t *update_odd;
     float *update_odd_weight;
+    pliant_wavelet_triple *triples;
+    int32_t *singles;
 } plan_arrays;
+
+static int32_t has_triples(const pliant_wavelet *w)
+{
+    return w->def.scheme == PLIANT_BUTTERFLY && w->def.boundary == PLIANT_ZERO &&
+           w->count <= PLIANT_TRIPLE_ROW_LIMIT;
+}
 
 // Carve the arrays out of `block`; with NULL only count the bytes.
 static size_t lay_out(char *block, const pliant_wavelet *w, plan_arrays *arrays)
 {
     const size_t odd = (size_t)(w->count - w->level_offset[1]);
     const size_t stencil = odd * (size_t)w->stencil_size;
+    const int32_t is_grouped = has_triples(w);
     size_t offsets = 0;
     for (int32_t l = 0; l + 1 < w->level_count; l++) offsets += (size_t)w->level_offset[l + 1] + 1;
 
     size_t bytes = 0;
 #define CARVE(field, number)                                                                       \
     do {                                                                                           \
-        bytes = (bytes + 15) & ~(size_t)15;                                                        \
+        bytes = (bytes + 63) & ~(size_t)63;                                                        \
         if (block) arrays->field = (void *)(block + bytes);                                        \
         bytes += (number) * sizeof *arrays->field;                                                 \
     } while (0)
@@ -62,6 +71,8 @@ static size_t lay_out(char *block, const pliant_wavelet *w, plan_arrays *arrays)
     CARVE(update_offset, offsets);
     CARVE(update_odd, 2 * odd);
     CARVE(update_odd_weight, 2 * odd);
+    CARVE(triples, is_grouped ? odd / 2 : 0);  // each has two of its own at least
+    CARVE(singles, is_grouped ? odd : 0);
 #undef CARVE
     return bytes;
 }
@@ -157,6 +168,104 @@ static void gather_updates(pliant_wavelet *w, plan_arrays *arrays)
     }
 }
 
+// ---- Plan of butterflies in threes ----
+
+// Is this triangle of level l turned like the one of the base mesh that it lies in? The last child of
+// a split is turned round, the others are not.
+static int32_t is_upright(int32_t l, int32_t face)
+{
+    int32_t turns = 0;
+    for (; l > 0; l--, face /= 4) turns += face % 4 == 3;
+    return turns % 2 == 0;
+}
+
+// The vertices of a triple.
+typedef struct triangle {
+    int32_t corner[3], across[3], odd[3];
+    const int32_t *inner[3], *outer[3];  // the wings on this side of each edge, and beyond it
+} triangle;
+
+static int32_t is_pair(const int32_t *pair, int32_t a, int32_t b)
+{
+    return (pair[0] == a && pair[1] == b) || (pair[0] == b && pair[1] == a);
+}
+
+// The triangle of a face of level l. 0 when the stencils on its edges are not of that form, which
+// happens on coarse meshes, where nodes of a stencil coincide.
+static int32_t find_triangle(const pliant_hierarchy *hierarchy, int32_t l, int32_t face,
+                             triangle *t)
+{
+    const int32_t *corner = hierarchy->faces[l] + 3 * (size_t)face;
+    const int32_t *middle = hierarchy->faces[l + 1] + 3 * (4 * (size_t)face + 3);  // ab, bc, ca
+    for (int k = 0; k < 3; k++) {
+        t->corner[k] = corner[k];
+        t->odd[k] = middle[(k + 1) % 3];
+        const pliant_stencil *stencil =
+            &hierarchy->stencils[t->odd[k] - hierarchy->vertex_count[0]];
+        const int side = stencil->opposite[0] == corner[k] ? 0 : 1;
+        if (stencil->opposite[side] != corner[k]) return 0;
+        t->across[k] = stencil->opposite[1 - side];
+        t->inner[k] = stencil->wings + 2 * side;
+        t->outer[k] = stencil->wings + 2 * (1 - side);
+    }
+    return is_pair(t->inner[0], t->across[1], t->across[2]) &&
+           is_pair(t->inner[1], t->across[2], t->across[0]) &&
+           is_pair(t->inner[2], t->across[0], t->across[1]);
+}
+
+// From vertices to rows, with the odd positions that are inside and not taken yet in front. Returns
+// how many those are.
+static int32_t place_triangle(const triangle *from, const int32_t *position, int32_t count,
+                              const uint8_t *is_taken, pliant_wavelet_triple *to)
+{
+    int32_t wanted = 0, unwanted = 2, order[3];
+    for (int32_t k = 0; k < 3; k++) {
+        const int32_t p = position[from->odd[k]];
+        if (p < count && !is_taken[p]) order[wanted++] = k;
+        else order[unwanted--] = k;
+    }
+    *to = (pliant_wavelet_triple){.padding = 0};
+#define ROW(vertex) (uint16_t)(2 * position[vertex])
+    for (int32_t i = 0; i < 3; i++) {
+        const int32_t k = order[i];
+        to->corner[i] = ROW(from->corner[k]);
+        to->across[i] = ROW(from->across[k]);
+        to->outer[i][0] = ROW(from->outer[k][0]);
+        to->outer[i][1] = ROW(from->outer[k][1]);
+        to->odd[i] = ROW(from->odd[order[i < wanted ? i : 0]]);
+    }
+#undef ROW
+    return wanted;
+}
+
+// Upright triangles meet at edges only where those of the base mesh do. Taking them all leaves a few
+// per cent of the odd positions, and of the triples a third has but two.
+static void plan_triples(const pliant_hierarchy *hierarchy, const int32_t *position,
+                         pliant_wavelet *w, plan_arrays *arrays, uint8_t *is_taken)
+{
+    int32_t triples = 0, singles = 0;
+    memset(is_taken, 0, (size_t)w->count);
+    for (int32_t l = 0; l + 1 < w->level_count; l++) {
+        w->triple_offset[l] = triples;
+        w->single_offset[l] = singles;
+        for (int32_t f = 0; f < hierarchy->face_count[l]; f++) {
+            triangle found;
+            pliant_wavelet_triple placed;
+            if (!is_upright(l, f) || !find_triangle(hierarchy, l, f, &found)) continue;
+            const int32_t wanted = place_triangle(&found, position, w->count, is_taken, &placed);
+            if (wanted < 2) continue;
+            for (int32_t i = 0; i < wanted; i++) is_taken[placed.odd[i] / 2] = 1;
+            arrays->triples[triples++] = placed;
+        }
+        for (int32_t p = w->level_offset[l + 1]; p < w->level_offset[l + 2]; p++)
+            if (!is_taken[p]) arrays->singles[singles++] = p;
+    }
+    w->triple_offset[w->level_count - 1] = triples;
+    w->single_offset[w->level_count - 1] = singles;
+    w->triples = arrays->triples;
+    w->singles = arrays->singles;
+}
+
 pliant_status pliant_wavelet_create(const pliant_hierarchy *hierarchy, const double *areas,
                                     const int32_t *nodes, int32_t count,
                                     const pliant_wavelet_def *def, pliant_wavelet **wavelet,
@@ -216,6 +325,8 @@ pliant_status pliant_wavelet_create(const pliant_hierarchy *hierarchy, const dou
     }
     plan_updates(w, &arrays, integral);
     gather_updates(w, &arrays);
+    // The integrals have served: their place keeps what is taken.
+    if (has_triples(w)) plan_triples(hierarchy, position, w, &arrays, (uint8_t *)integral);
     w->predict_node = arrays.predict_node;
     w->predict_weight = arrays.predict_weight;
     w->predict_weight_f = arrays.predict_weight_f;

@@ -109,7 +109,7 @@ static int run(int argc, char **argv, int rank)
     }
     char *command_line = join(argc, argv);
     pliant_progress progress = pliant_progress_create(
-        rank == 0 && options.reporting != PLIANT_REPORT_QUIET ? program : NULL);
+        rank == 0 && options.talk == PLIANT_TALK_PROGRESS ? program : NULL);
     pliant_run_summary summary;
     const PetscErrorCode code = pliant_run(PETSC_COMM_WORLD, &options, command_line ? command_line : program,
                                            &progress, &summary, &err);
@@ -122,7 +122,7 @@ static int run(int argc, char **argv, int rank)
         return EXIT_FAILED;
     }
     if (options.reporting == PLIANT_REPORT_JSON) print_json(&options, &summary);
-    else if (options.reporting == PLIANT_REPORT_TEXT) print_text(&options, &summary);
+    else if (options.talk == PLIANT_TALK_PROGRESS) print_text(&options, &summary);
     if (fflush(stdout) == 0 && !ferror(stdout)) return EXIT_DONE;
     fprintf(stderr, "%s: cannot write the summary to standard output\n", program);
     return EXIT_FAILED;

@@ -46,7 +46,7 @@ static const char help[] =
     "  --blocks free|all       free-free block only (default), or supports and reactions too\n"
     "  --dense FILE.h5         also store the exact dense columns (small models, for comparisons)\n"
     "  --force                 replace existing outputs\n"
-    "  -q, --quiet             print errors only\n"
+    "  -q, --quiet             print errors only (and the summary with --json)\n"
     "  --json                  print the summary as one JSON object\n"
     "  -h, --help  --version\n"
     "\n"
@@ -195,7 +195,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             *action = PLIANT_OPTIONS_VERSION;
             return PLIANT_OK;
         case 'o': o.output = optarg; break;
-        case 'q': o.reporting = PLIANT_REPORT_QUIET; break;
+        case 'q': o.talk = PLIANT_TALK_ERRORS; break;
         case OPTION_JSON: o.reporting = PLIANT_REPORT_JSON; break;
         case OPTION_FORCE: o.existing = PLIANT_REPLACE_EXISTING; break;
         case OPTION_DENSE: o.dense = optarg; break;

@@ -10,11 +10,16 @@ typedef enum pliant_blocks {
     PLIANT_BLOCKS_ALL,   // fixed rows and columns too
 } pliant_blocks;
 
+// The summary on standard output.
 typedef enum pliant_reporting {
     PLIANT_REPORT_TEXT,
-    PLIANT_REPORT_QUIET,  // nothing but errors
-    PLIANT_REPORT_JSON,   // one object on standard output
+    PLIANT_REPORT_JSON,  // one object
 } pliant_reporting;
+
+typedef enum pliant_talk {
+    PLIANT_TALK_PROGRESS,
+    PLIANT_TALK_ERRORS,  // --quiet: neither progress nor a text summary
+} pliant_talk;
 
 typedef enum pliant_existing {
     PLIANT_KEEP_EXISTING,
@@ -31,6 +36,7 @@ typedef struct pliant_options {
     pliant_compression_def compression;
     pliant_blocks blocks;
     pliant_reporting reporting;
+    pliant_talk talk;
     pliant_existing existing;
 } pliant_options;
 

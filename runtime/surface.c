@@ -1,9 +1,13 @@
 // surface.c: read a solution: the whole surface to a level, or chosen vertices (steps (7), (8)).
 #include "solver.h"
 
+#include "pliant/vector_clones.h"
+
 #include <string.h>
 
-typedef float row4 __attribute__((vector_size(16)));
+typedef float row16 __attribute__((vector_size(64)));
+typedef float packed8 __attribute__((vector_size(32), aligned(4)));
+typedef float packed4 __attribute__((vector_size(16), aligned(4)));
 
 static int32_t find_solved(const pliant_solver *solver, int32_t vertex)
 {
@@ -21,24 +25,25 @@ static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
     field->reconstructed = level;
 }
 
-// Scatter rows of four to packed vertices, ascending. A store of four floats spills one into the
-// next vertex, which is written later: by this loop, or by the caller's pass over the fixed ones.
-// Only the last vertex has nobody behind it.
-static void pack_free(const float *g, const int32_t *nodes, int32_t count, int32_t vertex_count,
-                      pliant_vec3 *u)
+// Scatter rows of four floats to packed vertices. Nodes ascend and most follow each other (the 2143
+// free ones of a test body in 65 runs), so go by fours: 0.4 us there, one by one 1.1.
+PLIANT_VECTOR_CLONES
+static void pack(const float *rows, const int32_t *nodes, int32_t count, pliant_vec3 *u)
 {
-    const row4 *row = (const row4 *)g;
-    float *to = (float *)u;
-    const int32_t last = count > 0 && nodes[count - 1] == vertex_count - 1 ? count - 1 : count;
-    for (int32_t p = 0; p < last; p++) memcpy(to + 3 * (size_t)nodes[p], &row[p], sizeof(row4));
-    if (last < count) memcpy(&u[vertex_count - 1], g + 4 * (size_t)last, sizeof *u);
-}
-
-static void pack_fixed(const float *displacement, const int32_t *nodes, int32_t count,
-                       pliant_vec3 *u)
-{
-    for (int32_t p = 0; p < count; p++)
-        memcpy(&u[nodes[p]], displacement + 4 * (size_t)p, sizeof *u);
+    int32_t p = 0;
+    while (p < count) {
+        if (p + 4 <= count && nodes[p + 3] - nodes[p] == 3) {
+            row16 four;
+            memcpy(&four, rows + 4 * (size_t)p, sizeof four);
+            float *to = &u[nodes[p]].x;
+            *(packed8 *)to = __builtin_shufflevector(four, four, 0, 1, 2, 4, 5, 6, 8, 9);
+            *(packed4 *)(to + 8) = __builtin_shufflevector(four, four, 10, 12, 13, 14);
+            p += 4;
+        } else {
+            memcpy(&u[nodes[p]], rows + 4 * (size_t)p, sizeof *u);
+            p++;
+        }
+    }
 }
 
 pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant_vec3 *u)
@@ -51,10 +56,10 @@ pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant
     const int32_t vertex_count = model->hierarchy->vertex_count[level];
     const pliant_model_domain *free_domain = &model->domains[PLIANT_DOMAIN_FREE];
     const pliant_model_domain *fixed_domain = &model->domains[PLIANT_DOMAIN_FIXED];
-    pack_free(solver->fields[PLIANT_DOMAIN_FREE].g, free_domain->nodes,
-              free_domain->wavelet->level_offset[level + 1], vertex_count, u);
-    pack_fixed(solver->fixed_displacement, fixed_domain->nodes,
-               fixed_domain->wavelet->level_offset[level + 1], u);
+    pack(solver->fields[PLIANT_DOMAIN_FREE].g, free_domain->nodes,
+         free_domain->wavelet->level_offset[level + 1], u);
+    pack(solver->fixed_displacement, fixed_domain->nodes,
+         fixed_domain->wavelet->level_offset[level + 1], u);
     // (8) at S the displacement is known: specified at free nodes, solved for at freed ones.
     for (int32_t i = 0; i < solver->solved_count; i++) {
         const int32_t vertex = solver->solved[i].vertex;

@@ -2,7 +2,14 @@
 //
 // The plain C stays the reference: the clones are the same source. Without compiler support, and
 // under the sanitizers (whose runtime is not up yet when the choice is made), there is one version.
+//
+// Files that include this also let products and sums fuse where the machine can (to half the time in
+// dense.c): clang does so by itself, gcc not under -std=c11.
 #pragma once
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("fp-contract=fast")
+#endif
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define PLIANT_VECTOR_CLONES

@@ -43,6 +43,23 @@ pliant_wavelet_def pliant_wavelet_default(void);
 
 #define PLIANT_STENCIL_LIMIT 8
 
+// Up to three odd positions on the edges of one triangle, whose butterflies share most of their nodes:
+// on line 12 rows are read instead of 24. With T = (sum of corners) / 2 - (sum of across) / 16, the
+// prediction on the edge opposite to corner[k] is
+//
+//     T - 3/8 corner[k] + 3/16 across[k] - 1/16 (outer[k][0] + outer[k][1])
+//
+// where across[k] is the corner beyond that edge and outer[k] are the wings over there. Numbers are
+// 2 x position, since x86 multiplies addresses by 8 at most and a row has 16 bytes.
+typedef struct pliant_wavelet_triple {
+    uint16_t corner[3], across[3], outer[3][2];
+    uint16_t odd[3];  // distinct ones first; one that repeats odd[0] is not wanted
+    uint16_t padding;
+} pliant_wavelet_triple;
+
+// The largest domain that such numbers reach.
+#define PLIANT_TRIPLE_ROW_LIMIT 32767
+
 // The plan of one domain's transform; const after create. Positions outside the domain are
 // `count`, and every data array has count + 1 rows of which the last is zero.
 typedef struct pliant_wavelet {
@@ -64,6 +81,12 @@ typedef struct pliant_wavelet {
     const int32_t *update_offset[PLIANT_LEVEL_LIMIT + 1];
     const int32_t *update_odd;
     const float *update_odd_weight;
+    // On line, for butterflies under zero extension in domains that triples reach: the odd positions
+    // of level l + 1 are triples triple_offset[l] .. triple_offset[l+1], and likewise singles.
+    const pliant_wavelet_triple *triples;  // NULL: none
+    const int32_t *singles;                // odd positions that are in no triple
+    int32_t triple_offset[PLIANT_LEVEL_LIMIT + 1];
+    int32_t single_offset[PLIANT_LEVEL_LIMIT + 1];
 } pliant_wavelet;
 
 // Plan the transform of the domain `nodes` (ascending vertex numbers, shape [count]). `areas`, shape
