@@ -114,25 +114,24 @@ static pliant_status compress(pliant_greens *g, int fixed_columns, int32_t posit
     return PLIANT_OK;
 }
 
-// Test solved columns against the kept row: |A_s x - b_s| / (|A_s| |x|), largest.
+// Test solved columns against the kept rows: the backward error |A_s x - b_s| / (|A_s| |x| + |b_s|),
+// with absolute values taken entry by entry, which scaling columns does not change; the largest.
 static double sample_residual(const pliant_sample_row *sample, int32_t n, const int32_t *vertices,
                               int32_t count, const double *columns, size_t ld)
 {
     double worst = 0;
     for (int32_t j = 0; sample->vertex >= 0 && j < 3 * count; j++) {
         const double *x = columns + (size_t)j * ld;
-        double product[3] = {0}, row_square = 0, square = 0;
-        for (size_t u = 0; u < 3 * (size_t)n; u++) {
-            for (int r = 0; r < 3; r++) {
-                product[r] += sample->A[3 * u + r] * x[u];
-                row_square += sample->A[3 * u + r] * sample->A[3 * u + r];
-            }
-            square += x[u] * x[u];
-        }
         const double *b = sample->B + 3 * (3 * (size_t)vertices[j / 3] + j % 3);
-        double residual = 0;
-        for (int r = 0; r < 3; r++) residual = fmax(residual, fabs(product[r] - b[r]));
-        worst = fmax(worst, square > 0 ? residual / sqrt(row_square * square) : residual);
+        for (int r = 0; r < 3; r++) {
+            double residual = -b[r], size = fabs(b[r]);
+            for (size_t u = 0; u < 3 * (size_t)n; u++) {
+                const double term = sample->A[3 * u + r] * x[u];
+                residual += term;
+                size += fabs(term);
+            }
+            worst = fmax(worst, size > 0 ? fabs(residual) / size : 0);
+        }
     }
     return worst;
 }

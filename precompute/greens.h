@@ -15,7 +15,7 @@ typedef struct pliant_greens {
     pliant_compression *blocks[PLIANT_BLOCK_COUNT];   // NULL where not asked for
     pliant_compression_result results[PLIANT_BLOCK_COUNT];
     float *gravity_free, *gravity_fixed;  // [m][3][3], [k][3][3]: wavelet coefficients; all ranks
-    double residual;                      // largest |A x - b| / (|A| |x|) over sampled rows
+    double residual;                      // largest backward error of sampled rows and columns
     double solve_seconds, transform_seconds;
 } pliant_greens;
 

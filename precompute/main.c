@@ -96,7 +96,9 @@ static int run(int argc, char **argv, int rank)
     pliant_options options;
     pliant_options_action action;
     pliant_error err = {""};
+    char *command_line = join(argc, argv);  // as typed: parsing moves the arguments about
     const pliant_status status = pliant_options_parse(argc, argv, &options, &action, &err);
+    if (status < 0 || action != PLIANT_OPTIONS_RUN) free(command_line);
     if (status < 0) {
         if (rank == 0) fprintf(stderr, "%s: %s\n", program, err.text);
         return EXIT_MISUSED;
@@ -107,7 +109,6 @@ static int run(int argc, char **argv, int rank)
         else printf("%s %s\n", program, PLIANT_VERSION_TEXT);
         return fflush(stdout) == 0 ? EXIT_DONE : EXIT_FAILED;
     }
-    char *command_line = join(argc, argv);
     pliant_progress progress = pliant_progress_create(
         rank == 0 && options.talk == PLIANT_TALK_PROGRESS ? program : NULL);
     pliant_run_summary summary;

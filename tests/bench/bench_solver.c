@@ -24,7 +24,7 @@ extern void dgetrf_(const int *m, const int *n, double *a, const int *lda, int *
 extern void dgetri_(const int *n, double *a, const int *lda, const int *pivots, double *work,
                     const int *lwork, int *info);
 
-enum { patch_count = 6, frame_count = 301, size_count = 5 };
+enum { patch_count = 4, frame_count = 301, size_count = 5 };
 static const int32_t sizes[size_count] = {1, 10, 30, 100, 300};
 
 static double now_us(void)
