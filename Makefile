@@ -81,6 +81,7 @@ LIB_draw       := $(OBJ)/libdraw.a
 LIB_support    := $(OBJ)/libsupport.a
 LIB_pliant     := $(OUT)/libpliant.a
 SO_pliant      := $(OUT)/libpliant.so.$(VERSION)
+SONAME         := libpliant.so.$(firstword $(subst ., ,$(VERSION)))
 
 PROGRAMS := $(OUT)/pliant-play $(OUT)/pliant-info
 SKIPPED  :=
@@ -103,7 +104,7 @@ endif
 all: $(PROGRAMS) $(SO_pliant) $(LIB_pliant)  ## build what this machine can, say what was skipped
 	@$(if $(strip $(SKIPPED)),echo "skipped: $(SKIPPED)",:)
 
-runtime: $(OUT)/pliant-play $(OUT)/pliant-info $(SO_pliant) $(LIB_pliant)  ## the runtime alone: a C compiler and LAPACK
+runtime: $(OUT)/pliant-play $(OUT)/pliant-info $(SO_pliant) $(LIB_pliant)  ## the runtime alone: a C compiler, and LAPACK for the player
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
@@ -178,9 +179,9 @@ $(LIB_pliant): $(call objects,$(SRC_runtime) $(SRC_common) $(SRC_formats))
 	$(archive)
 
 # libpliant links whole (-z defs) against all it may know: a stray H5Dopen does not link.
-$(SO_pliant): $(call objects,$(SRC_runtime) $(SRC_common) $(SRC_formats))
-	@echo "  link $@"; $(CC) $(LINK) -shared -Wl,-soname,libpliant.so.$(VERSION) $(if $(filter -fsanitize=%,$(FLAVOUR)),,-Wl,-z,defs) -o $@ $^ $(LAPACK_LIBS) -lm -lpthread
-	@ln -sf libpliant.so.$(VERSION) $(OUT)/libpliant.so
+$(SO_pliant): $(call objects,$(SRC_runtime) $(SRC_common) $(SRC_formats)) | runtime/libpliant.map
+	@echo "  link $@"; $(CC) $(LINK) -shared -Wl,-soname,$(SONAME) -Wl,--version-script=runtime/libpliant.map $(if $(filter -fsanitize=%,$(FLAVOUR)),,-Wl,-z,defs) -o $@ $^ -lm -lpthread
+	@ln -sf libpliant.so.$(VERSION) $(OUT)/$(SONAME); ln -sf $(SONAME) $(OUT)/libpliant.so
 
 program = @mkdir -p $(@D); echo "  link $@"; $(CC) $(LINK) -o $@ $(filter %.o %.a,$^)
 $(OUT)/pliant-precompute: $(OBJ)/precompute/main.o $(LIB_precompute) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
@@ -188,7 +189,7 @@ $(OUT)/pliant-precompute: $(OBJ)/precompute/main.o $(LIB_precompute) $(LIB_phdf5
 $(OUT)/pliant-play: $(OBJ)/runtime/play/main.o $(LIB_play) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(HDF5_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/pliant-info: $(OBJ)/runtime/info/main.o $(LIB_info) $(LIB_pliant)
-	$(program) $(LAPACK_LIBS) -lm -lpthread
+	$(program) -lm -lpthread
 $(OUT)/pliant-draw: $(OBJ)/runtime/draw/main.o $(LIB_draw) $(LIB_play) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
 
@@ -250,14 +251,15 @@ format:  ## rewrite the sources with clang-format
 $(OUT)/pliant.pc: Makefile
 	@mkdir -p $(@D); printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$${prefix}/lib' 'includedir=$${prefix}/include' '' \
 	 'Name: pliant' 'Description: precomputed elastic solids in real time' 'Version: $(VERSION)' \
-	 'Cflags: -I$${includedir}' 'Libs: -L$${libdir} -lpliant' 'Libs.private: $(LAPACK_LIBS) -lm -lpthread' > $@
+	 'Cflags: -I$${includedir}' 'Libs: -L$${libdir} -lpliant' 'Libs.private: -lm -lpthread' > $@
 
 install: all $(OUT)/pliant.pc  ## install under PREFIX (/usr/local), staged by DESTDIR
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 755 $(PROGRAMS) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB_pliant) $(DESTDIR)$(PREFIX)/lib
 	install -m 755 $(SO_pliant) $(DESTDIR)$(PREFIX)/lib
-	ln -sf libpliant.so.$(VERSION) $(DESTDIR)$(PREFIX)/lib/libpliant.so
+	ln -sf libpliant.so.$(VERSION) $(DESTDIR)$(PREFIX)/lib/$(SONAME)
+	ln -sf $(SONAME) $(DESTDIR)$(PREFIX)/lib/libpliant.so
 	install -m 644 common/include/pliant/base.h runtime/include/pliant/pliant.h $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 644 $(OUT)/pliant.pc $(DESTDIR)$(PREFIX)/lib/pkgconfig
 

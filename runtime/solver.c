@@ -35,6 +35,12 @@ int64_t pliant_solver_clock(void)
 
 // ---- Life ----
 
+static int32_t is_compact(const pliant_solver *solver, int32_t row_domain)
+{
+    return solver->add_compact &&
+           solver->model->domains[row_domain].count <= PLIANT_COMPACT_ROW_LIMIT;
+}
+
 static void lay_out(pliant_arena *arena, pliant_solver *solver)
 {
     const pliant_model *model = solver->model;
@@ -50,6 +56,10 @@ static void lay_out(pliant_arena *arena, pliant_solver *solver)
         PLIANT_TAKE(arena, field->query_slots, solver->query_capacity);
         pliant_reconstruction_lay_out(arena, model->domains[d].wavelet, &field->plan);
     }
+    for (int32_t d = 0; d < solver->domain_count; d++)
+        for (int32_t c = 0; c < solver->domain_count; c++)
+            if (is_compact(solver, d))
+                pliant_compact_lay_out(arena, &model->greens[d][c], &solver->compact[d][c]);
     PLIANT_TAKE(arena, solver->constraints, capacity);
     PLIANT_TAKE(arena, solver->solved, capacity);
     PLIANT_TAKE(arena, solver->reference, capacity);
@@ -73,7 +83,10 @@ static void lay_out(pliant_arena *arena, pliant_solver *solver)
 pliant_solver_def pliant_solver_default(const pliant_model *model)
 {
     (void)model;  // nothing depends on it yet
-    return (pliant_solver_def){.constraint_capacity = 64, .load_capacity = 256, .cache_count = 4};
+    return (pliant_solver_def){.constraint_capacity = 64,
+                               .load_capacity = 256,
+                               .cache_count = 4,
+                               .storage = PLIANT_STORAGE_HALF};
 }
 
 static float largest(const float *values, size_t count)
@@ -95,7 +108,8 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
         int32_t value, least, most;
     } fields[] = {{"constraint_capacity", used.constraint_capacity, 1, INT32_MAX},
                   {"load_capacity", used.load_capacity, 0, INT32_MAX},
-                  {"cache_count", used.cache_count, 1, cache_limit}};
+                  {"cache_count", used.cache_count, 1, cache_limit},
+                  {"storage", (int32_t)used.storage, PLIANT_STORAGE_FLOAT, PLIANT_STORAGE_HALF}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
         if (fields[i].value < fields[i].least || fields[i].value > fields[i].most)
             return pliant_error_set(
@@ -108,6 +122,7 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
     solver->model = model;
     solver->domain_count = pliant_capacitance_domain_count(model);
     solver->add_column = pliant_columns_kernel_best();
+    if (used.storage == PLIANT_STORAGE_HALF) solver->add_compact = pliant_compact_kernel_best();
     // More than one statement a vertex there cannot be.
     solver->constraint_capacity = used.constraint_capacity < n ? used.constraint_capacity : n;
     solver->load_capacity = used.load_capacity < n ? used.load_capacity : n;
@@ -131,6 +146,9 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
         field->gravity_weight =
             domain->gravity ? largest(domain->gravity, 9 * (size_t)domain->count) : 0;
         for (int32_t p = 0; p < domain->count; p++) solver->all_rows[p] = p;
+        for (int32_t c = 0; c < solver->domain_count; c++)
+            if (is_compact(solver, d))
+                pliant_compact_fill(&model->greens[d][c], &solver->compact[d][c]);
     }
     memset(solver->load_of, 0xff, (size_t)n * sizeof *solver->load_of);
     pliant_capacitance_scratch_begin(model, &solver->scratch);
@@ -353,6 +371,24 @@ static void solve_contact(pliant_solver *solver, const pliant_capacitance *type)
 
 // ---- Step (6) ----
 
+// The columns of S may come in half precision: unlike `base` their sum does not enter q, and so no
+// force.
+static void add_contact_column(const pliant_solver *solver, int32_t row_domain, int32_t vertex,
+                               const float *value, float *rows)
+{
+    const pliant_model *model = solver->model;
+    const pliant_compact_columns *compact = &solver->compact[row_domain][model->domain[vertex]];
+    if (!compact->offset) {
+        add_column(solver, row_domain, vertex, value, rows);
+        return;
+    }
+    const int32_t column = model->position[vertex];
+    const float scale = compact->scale[column];
+    const float scaled[3] = {scale * value[0], scale * value[1], scale * value[2]};
+    const uint64_t begin = compact->offset[column], end = compact->offset[column + 1];
+    solver->add_compact(compact->block + begin, (size_t)(end - begin), scaled, rows);
+}
+
 void pliant_solver_sum(pliant_solver *solver, int32_t d)
 {
     pliant_field *field = &solver->fields[d];
@@ -363,7 +399,7 @@ void pliant_solver_sum(pliant_solver *solver, int32_t d)
     for (int32_t i = 0; i < solver->solved_count; i++) {
         const float value[3] = {solver->reference[i].x, solver->reference[i].y,
                                 solver->reference[i].z};
-        add_column(solver, d, solver->solved[i].vertex, value, field->g);
+        add_contact_column(solver, d, solver->solved[i].vertex, value, field->g);
     }
     field->is_summed = 1;
     field->reconstructed = 0;

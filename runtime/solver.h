@@ -2,6 +2,7 @@
 #pragma once
 
 #include "capacitance.h"
+#include "compact.h"
 #include "model.h"
 
 // A node of S: its specified value, and after a solve the one of reference type that realises it.
@@ -40,6 +41,9 @@ struct pliant_solver {
     const pliant_model *model;  // borrowed
     pliant_arena arena;
     pliant_columns_kernel *add_column;
+    // Columns of S in half precision, [row domain][column domain]; offset NULL: summed from floats.
+    pliant_compact_kernel *add_compact;  // NULL: all are
+    pliant_compact_columns compact[PLIANT_DOMAIN_COUNT][PLIANT_DOMAIN_COUNT];
     int32_t domain_count;  // domains with rows: 2 with supports, else 1
     int32_t constraint_capacity, load_capacity, cache_count;
     int32_t query_capacity, query_at_once;  // see solver.c

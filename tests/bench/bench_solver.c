@@ -182,7 +182,7 @@ typedef struct step_times {
 static step_times time_steps(const pliant_model *model, int32_t s, pliant_vec3 *u)
 {
     const pliant_solver_def def = {
-        .constraint_capacity = s, .load_capacity = 16, .cache_count = patch_count};
+        .constraint_capacity = s, .load_capacity = 16, .cache_count = patch_count, .storage=getenv("FL")?0:1};
     pliant_solver *solver = NULL;
     pliant_error err = {""};
     require(pliant_solver_create(model, &def, &solver, &err), &err);
