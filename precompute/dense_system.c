@@ -33,11 +33,8 @@ static PetscErrorCode choose_kind(MPI_Comm comm, int32_t n, dense_kind *kind)
 {
     PetscFunctionBegin;
     PetscMPIInt size, node_size;
-    MPI_Comm node;
     PetscCallMPI(MPI_Comm_size(comm, &size));
-    PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
-    PetscCallMPI(MPI_Comm_size(node, &node_size));
-    PetscCallMPI(MPI_Comm_free(&node));
+    PetscCall(pliant_node_size(comm, &node_size));
     int together = node_size == size, everyone;
     PetscCallMPI(MPI_Allreduce(&together, &everyone, 1, MPI_INT, MPI_MIN, comm));
     *kind = everyone && 3 * (int64_t)n <= largest_sequential ? NODE : SCALAPACK;

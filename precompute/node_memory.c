@@ -81,6 +81,16 @@ PetscErrorCode pliant_node_widen(MPI_Comm node, int leader)
     PetscFunctionReturn(0);
 }
 
+PetscErrorCode pliant_node_size(MPI_Comm comm, PetscMPIInt *size)
+{
+    PetscFunctionBegin;
+    MPI_Comm node;
+    PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
+    PetscCallMPI(MPI_Comm_size(node, size));
+    PetscCallMPI(MPI_Comm_free(&node));
+    PetscFunctionReturn(0);
+}
+
 void pliant_node_threads(int threads)
 {
     // Only OpenBLAS's name for it is looked up; another BLAS keeps its own setting.

@@ -25,5 +25,8 @@ PetscErrorCode pliant_node_wait(MPI_Comm comm);
 PetscErrorCode pliant_node_widen(MPI_Comm node, int leader);
 void pliant_node_threads(int threads);
 
+// Collective: the number of comm's ranks on this machine.
+PetscErrorCode pliant_node_size(MPI_Comm comm, PetscMPIInt *size);
+
 // Bytes that this machine can still give: MemAvailable, or less where the control group says so.
 double pliant_node_available(void);

@@ -65,11 +65,8 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
 {
     PetscFunctionBegin;
     PetscMPIInt size, node_size;
-    MPI_Comm node;
     PetscCallMPI(MPI_Comm_size(comm, &size));
-    PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
-    PetscCallMPI(MPI_Comm_size(node, &node_size));
-    PetscCallMPI(MPI_Comm_free(&node));
+    PetscCall(pliant_node_size(comm, &node_size));
 
     pliant_dense_plan plan;
     PetscCall(pliant_dense_system_plan(comm, p->vertex_count, pliant_greens_batch(comm), &plan));

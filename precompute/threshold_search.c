@@ -79,19 +79,22 @@ static size_t array_bytes(const searcher *s)
     return ((size_t)s->wavelet->count + 1) * width * sizeof(float);
 }
 
+// Squared Frobenius norm of a row's block, lane by lane.
+static inline void block_squares(const float *row, float *square)
+{
+    for (int k = 0; k < lanes; k++) square[k] = 0;
+    for (int e = 0; e < entries; e++)
+        for (int k = 0; k < lanes; k++) square[k] += row[e * lanes + k] * row[e * lanes + k];
+}
+
 // Largest block norm squared and sum of them, lane by lane.
 PLIANT_VECTOR_CLONES
 static void measure(const float *x, int32_t rows, double *largest, double *sum)
 {
-    float top[lanes] = {0};
+    float top[lanes] = {0}, square[lanes];
     double total[lanes] = {0};
     for (int32_t i = 0; i < rows; i++) {
-        float square[lanes] = {0};
-        for (int e = 0; e < entries; e++)
-            for (int k = 0; k < lanes; k++) {
-                const float value = x[(size_t)i * width + e * lanes + k];
-                square[k] += value * value;
-            }
+        block_squares(x + (size_t)i * width, square);
         for (int k = 0; k < lanes; k++) {
             top[k] = square[k] > top[k] ? square[k] : top[k];
             total[k] += square[k];
@@ -104,14 +107,10 @@ static void measure(const float *x, int32_t rows, double *largest, double *sum)
 PLIANT_VECTOR_CLONES
 static void weighted_square(const float *x, const float *scale, int32_t rows, double *sum)
 {
+    float square[lanes];
     double total[lanes] = {0};
     for (int32_t i = 0; i < rows; i++) {
-        float square[lanes] = {0};
-        for (int e = 0; e < entries; e++)
-            for (int k = 0; k < lanes; k++) {
-                const float value = x[(size_t)i * width + e * lanes + k];
-                square[k] += value * value;
-            }
+        block_squares(x + (size_t)i * width, square);
         for (int k = 0; k < lanes; k++) total[k] += scale[i] * square[k];
     }
     memcpy(sum, total, sizeof total);
