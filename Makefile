@@ -107,7 +107,7 @@ all: $(PROGRAMS) $(SO_pliant) $(LIB_pliant)  ## build what this machine can, say
 runtime: $(OUT)/pliant-play $(OUT)/pliant-info $(SO_pliant) $(LIB_pliant)  ## the runtime alone: a C compiler, and LAPACK for the player
 
 help:  ## this list
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | sed "s/|/  \t/"
 
 configure:  ## what was found on this machine
 	@echo "compiler   $(CC)  $(shell $(CC) --version | head -1)"

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-_Static_assert(sizeof(pliant_compact_block) == 20, "a block is 20 bytes");
+_Static_assert(sizeof(pliant_compact_group) == 96, "a group is three registers of halves");
 
 // ---- Halves: IEEE 754 binary16 ----
 
@@ -43,16 +43,24 @@ uint16_t pliant_half_from_float(float value)
 
 static const int least_exponent = -100;
 
+static uint64_t group_count(const pliant_columns *columns, int32_t column)
+{
+    return (columns->offset[column + 1] - columns->offset[column] + 3) / 4;
+}
+
 void pliant_compact_lay_out(pliant_arena *arena, const pliant_columns *columns,
                             pliant_compact_columns *compact)
 {
+    uint64_t groups = 0;
+    for (int32_t j = 0; j < columns->count; j++) groups += group_count(columns, j);
+    PLIANT_TAKE(arena, compact->offset, columns->count + 1);
     PLIANT_TAKE(arena, compact->scale, columns->count);
-    PLIANT_TAKE(arena, compact->block, columns->offset[columns->count] + 1);
+    PLIANT_TAKE(arena, compact->group, groups);
 }
 
 void pliant_compact_fill(const pliant_columns *columns, pliant_compact_columns *compact)
 {
-    compact->offset = columns->offset;
+    compact->offset[0] = 0;
     for (int32_t j = 0; j < columns->count; j++) {
         int exponent = 0;
         (void)frexpf(pliant_columns_weight(columns, j), &exponent);
@@ -60,86 +68,80 @@ void pliant_compact_fill(const pliant_columns *columns, pliant_compact_columns *
         if (exponent < least_exponent) exponent = least_exponent;
         const float factor = ldexpf(1, 15 - exponent);
         compact->scale[j] = ldexpf(1, exponent - 15);
-        for (uint64_t e = columns->offset[j]; e < columns->offset[j + 1]; e++) {
-            pliant_compact_block *to = &compact->block[e];
-            for (int r = 0; r < 3; r++)
-                for (int c = 0; c < 3; c++)
-                    to->column[c][r] =
-                        pliant_half_from_float(columns->block[9 * e + (size_t)(3 * r + c)] * factor);
-            to->row = (uint16_t)columns->row[e];
+
+        const uint64_t begin = columns->offset[j], count = columns->offset[j + 1] - begin;
+        const uint64_t groups = group_count(columns, j);
+        pliant_compact_group *group = compact->group + compact->offset[j];
+        memset(group, 0, groups * sizeof *group);
+        for (uint64_t i = 0; i < 4 * groups; i++) {
+            uint16_t(*to)[4][4] = group[i / 4].column;
+            const uint64_t e = begin + (i < count ? i : count - 1);
+            to[0][i % 4][3] = (uint16_t)columns->row[e];
+            for (int c = 0; c < 3 && i < count; c++)
+                for (int r = 0; r < 3; r++)
+                    to[c][i % 4][r] = pliant_half_from_float(columns->block[9 * e + 3 * (size_t)r + (size_t)c] * factor);
         }
+        compact->offset[j + 1] = compact->offset[j] + groups;
     }
 }
 
 // ---- Kernels ----
 
-void pliant_compact_add_plain(const pliant_compact_block *block, size_t count, const float *value,
+void pliant_compact_add_plain(const pliant_compact_group *group, size_t count, const float *value,
                               float *g)
 {
-    for (size_t e = 0; e < count; e++, block++) {
-        float *to = g + 4 * (size_t)block->row;
+    for (size_t i = 0; i < 4 * count; i++) {
+        const uint16_t(*from)[4][4] = group[i / 4].column;
+        const size_t b = i % 4;
+        float *to = g + 4 * (size_t)from[0][b][3];
         for (int r = 0; r < 3; r++)
-            to[r] += pliant_half_to_float(block->column[0][r]) * value[0] +
-                     pliant_half_to_float(block->column[1][r]) * value[1] +
-                     pliant_half_to_float(block->column[2][r]) * value[2];
+            to[r] += pliant_half_to_float(from[0][b][r]) * value[0] +
+                     pliant_half_to_float(from[1][b][r]) * value[1] +
+                     pliant_half_to_float(from[2][b][r]) * value[2];
     }
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <immintrin.h>
 
-// Fetched ahead of use, as in columns.c.
-enum { prefetch_blocks = 32 };
-
-// One block: four halves from each column on, of which the fourth, the next column's or the row,
-// meets a zero or is cleared.
 __attribute__((target("avx,f16c,fma"))) static void
-add_f16c(const pliant_compact_block *block, size_t count, const float *value, float *g)
+add_f16c(const pliant_compact_group *group, size_t count, const float *value, float *g)
 {
-    const __m128 x = _mm_setr_ps(value[0], value[0], value[0], 0);
-    const __m128 y = _mm_setr_ps(value[1], value[1], value[1], 0);
-    const __m128 z = _mm_setr_ps(value[2], value[2], value[2], 0);
-    for (size_t e = 0; e < count; e++, block++) {
-        _mm_prefetch((const char *)(block + prefetch_blocks), _MM_HINT_T0);
-        const __m128 c0 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)block->column[0]));
-        const __m128 c1 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)block->column[1]));
-        const __m128 c2 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)block->column[2]));
-        float *to = g + 4 * (size_t)block->row;
-        __m128 sum = _mm_fmadd_ps(c0, x, _mm_load_ps(to));
-        sum = _mm_fmadd_ps(c1, y, sum);
-        sum = _mm_fmadd_ps(_mm_blend_ps(c2, _mm_setzero_ps(), 8), z, sum);
-        _mm_store_ps(to, sum);
-    }
+    const __m128 x = _mm_set1_ps(value[0]), y = _mm_set1_ps(value[1]), z = _mm_set1_ps(value[2]);
+    for (const pliant_compact_group *end = group + count; group < end; group++)
+        for (int b = 0; b < 4; b++) {
+            const __m128 c0 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)group->column[0][b]));
+            const __m128 c1 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)group->column[1][b]));
+            const __m128 c2 = _mm_cvtph_ps(_mm_loadl_epi64((const __m128i *)group->column[2][b]));
+            float *to = g + 4 * (size_t)group->column[0][b][3];
+            // The row, read as a half, is cleared.
+            __m128 sum = _mm_mul_ps(_mm_blend_ps(c0, _mm_setzero_ps(), 8), x);
+            sum = _mm_fmadd_ps(c2, z, _mm_fmadd_ps(c1, y, sum));
+            _mm_store_ps(to, _mm_add_ps(_mm_load_ps(to), sum));
+        }
 }
 
-// Four blocks, 40 halves: 16 from column c of the first block on hold that column in lanes 0 to 2, and
-// the second block's in lanes 10 to 12; likewise the other two blocks. The last load ends two halves
-// behind the fourth block.
 __attribute__((target("avx512f,avx512vl,f16c,fma"))) static void
-add_avx512(const pliant_compact_block *block, size_t count, const float *value, float *g)
+add_avx512(const pliant_compact_group *group, size_t count, const float *value, float *g)
 {
-    const __m512i gather = _mm512_setr_epi32(0, 1, 2, 0, 10, 11, 12, 0, 16, 17, 18, 0, 26, 27, 28, 0);
     const __mmask16 xyz = 0x7777;
     const __m512 x = _mm512_set1_ps(value[0]), y = _mm512_set1_ps(value[1]);
     const __m512 z = _mm512_set1_ps(value[2]);
-#define COLUMN(c)                                                                                  \
-    _mm512_maskz_permutex2var_ps(                                                                  \
-        xyz, _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)block[0].column[c])), gather,     \
-        _mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)block[2].column[c])))
-    size_t e = 0;
-    for (; e + 4 <= count; e += 4, block += 4) {
-        _mm_prefetch((const char *)(block + prefetch_blocks), _MM_HINT_T0);
-        const __m512 c0 = COLUMN(0), c1 = COLUMN(1), c2 = COLUMN(2);
-        const __m512 sum = _mm512_fmadd_ps(c2, z, _mm512_fmadd_ps(c1, y, _mm512_mul_ps(c0, x)));
-        float *to0 = g + 4 * (size_t)block[0].row, *to1 = g + 4 * (size_t)block[1].row;
-        float *to2 = g + 4 * (size_t)block[2].row, *to3 = g + 4 * (size_t)block[3].row;
+#define COLUMN(c) _mm256_load_si256((const __m256i *)group->column[c])
+#define ROW(b)    (g + 4 * (size_t)group->column[0][b][3])
+    for (const pliant_compact_group *end = group + count; group < end; group++) {
+        __m512 sum = _mm512_mul_ps(_mm512_maskz_cvtph_ps(xyz, COLUMN(0)), x);
+        sum = _mm512_fmadd_ps(_mm512_cvtph_ps(COLUMN(1)), y, sum);
+        sum = _mm512_fmadd_ps(_mm512_cvtph_ps(COLUMN(2)), z, sum);
+        float *to0 = ROW(0), *to1 = ROW(1), *to2 = ROW(2), *to3 = ROW(3);
+        // One after the other: the rows of a last group may be one.
         _mm_store_ps(to0, _mm_add_ps(_mm_load_ps(to0), _mm512_castps512_ps128(sum)));
         _mm_store_ps(to1, _mm_add_ps(_mm_load_ps(to1), _mm512_extractf32x4_ps(sum, 1)));
         _mm_store_ps(to2, _mm_add_ps(_mm_load_ps(to2), _mm512_extractf32x4_ps(sum, 2)));
         _mm_store_ps(to3, _mm_add_ps(_mm_load_ps(to3), _mm512_extractf32x4_ps(sum, 3)));
     }
 #undef COLUMN
-    if (e < count) add_f16c(block, count - e, value, g);
+#undef ROW
 }
 
 pliant_compact_kernel *pliant_compact_kernel_named(const char *name)

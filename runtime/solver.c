@@ -386,7 +386,7 @@ static void add_contact_column(const pliant_solver *solver, int32_t row_domain, 
     const float scale = compact->scale[column];
     const float scaled[3] = {scale * value[0], scale * value[1], scale * value[2]};
     const uint64_t begin = compact->offset[column], end = compact->offset[column + 1];
-    solver->add_compact(compact->block + begin, (size_t)(end - begin), scaled, rows);
+    solver->add_compact(compact->group + begin, (size_t)(end - begin), scaled, rows);
 }
 
 void pliant_solver_sum(pliant_solver *solver, int32_t d)
