@@ -249,7 +249,8 @@ layers: $(SO_pliant)  ## libpliant depends on nothing it may not know
 format:  ## rewrite the sources with clang-format
 	clang-format -i $(shell git ls-files '*.c' '*.h')
 
-$(OUT)/pliant.pc: Makefile
+# Made anew each time: PREFIX is not in a file's date.
+$(OUT)/pliant.pc: always
 	@mkdir -p $(@D); printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$${prefix}/lib' 'includedir=$${prefix}/include' '' \
 	 'Name: pliant' 'Description: precomputed elastic solids in real time' 'Version: $(VERSION)' \
 	 'Cflags: -I$${includedir}' 'Libs: -L$${libdir} -lpliant' 'Libs.private: -lm -lpthread' > $@
@@ -264,5 +265,5 @@ install: all $(OUT)/pliant.pc  ## install under PREFIX (/usr/local), staged by D
 	install -m 644 common/include/pliant/base.h runtime/include/pliant/pliant.h $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 644 $(OUT)/pliant.pc $(DESTDIR)$(PREFIX)/lib/pkgconfig
 
-.PHONY: all runtime help configure clean tests check bench fuzz fuzzers headers layers format install
+.PHONY: always all runtime help configure clean tests check bench fuzz fuzzers headers layers format install
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)

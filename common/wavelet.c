@@ -9,6 +9,7 @@
 #include "pliant/error.h"
 #include "pliant/vector_clones.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -115,7 +116,7 @@ static void plan_prediction(const pliant_wavelet *w, const pliant_stencil *stenc
 }
 
 // Update weights s_ma = I_m / (2 I_a), with the scaling functions' integrals I brought down level by
-// level: I_a(l) = I_a(l+1) + 1/2 sum of I_m(l+1) over the odd children m of a (FORMULAS 3).
+// level: I_a(l) = I_a(l+1) + 1/2 sum of I_m(l+1) over the odd children m of a (hat functions' integrals).
 static void plan_updates(const pliant_wavelet *w, plan_arrays *arrays, double *integral)
 {
     const int32_t odd_begin = w->level_offset[1];
@@ -170,8 +171,8 @@ static void gather_updates(pliant_wavelet *w, plan_arrays *arrays)
 
 // ---- Plan of butterflies in threes ----
 
-// Is this triangle of level l turned like the one of the base mesh that it lies in? The last child of
-// a split is turned round, the others are not.
+// Is this triangle of level l turned like the one of the base mesh that it lies in? The last child
+// of a split is turned round, the others are not.
 static int32_t is_upright(int32_t l, int32_t face)
 {
     int32_t turns = 0;
@@ -182,35 +183,27 @@ static int32_t is_upright(int32_t l, int32_t face)
 // The vertices of a triple.
 typedef struct triangle {
     int32_t corner[3], across[3], odd[3];
-    const int32_t *inner[3], *outer[3];  // the wings on this side of each edge, and beyond it
+    const int32_t *outer[3];  // the two wings beyond each edge
 } triangle;
 
-static int32_t is_pair(const int32_t *pair, int32_t a, int32_t b)
-{
-    return (pair[0] == a && pair[1] == b) || (pair[0] == b && pair[1] == a);
-}
-
-// The triangle of a face of level l. 0 when the stencils on its edges are not of that form, which
-// happens on coarse meshes, where nodes of a stencil coincide.
-static int32_t find_triangle(const pliant_hierarchy *hierarchy, int32_t l, int32_t face,
-                             triangle *t)
+// The triangle of a face of level l.
+static triangle find_triangle(const pliant_hierarchy *hierarchy, int32_t l, int32_t face)
 {
     const int32_t *corner = hierarchy->faces[l] + 3 * (size_t)face;
     const int32_t *middle = hierarchy->faces[l + 1] + 3 * (4 * (size_t)face + 3);  // ab, bc, ca
+    triangle t;
     for (int k = 0; k < 3; k++) {
-        t->corner[k] = corner[k];
-        t->odd[k] = middle[(k + 1) % 3];
+        t.corner[k] = corner[k];
+        t.odd[k] = middle[(k + 1) % 3];
         const pliant_stencil *stencil =
-            &hierarchy->stencils[t->odd[k] - hierarchy->vertex_count[0]];
-        const int side = stencil->opposite[0] == corner[k] ? 0 : 1;
-        if (stencil->opposite[side] != corner[k]) return 0;
-        t->across[k] = stencil->opposite[1 - side];
-        t->inner[k] = stencil->wings + 2 * side;
-        t->outer[k] = stencil->wings + 2 * (1 - side);
+            &hierarchy->stencils[t.odd[k] - hierarchy->vertex_count[0]];
+        // The wings on this side are the other two corners across.
+        const int beyond = stencil->opposite[0] == corner[k] ? 1 : 0;
+        assert(stencil->opposite[1 - beyond] == corner[k]);
+        t.across[k] = stencil->opposite[beyond];
+        t.outer[k] = stencil->wings + 2 * beyond;
     }
-    return is_pair(t->inner[0], t->across[1], t->across[2]) &&
-           is_pair(t->inner[1], t->across[2], t->across[0]) &&
-           is_pair(t->inner[2], t->across[0], t->across[1]);
+    return t;
 }
 
 // From vertices to rows, with the odd positions that are inside and not taken yet in front. Returns
@@ -238,8 +231,8 @@ static int32_t place_triangle(const triangle *from, const int32_t *position, int
     return wanted;
 }
 
-// Upright triangles meet at edges only where those of the base mesh do. Taking them all leaves a few
-// per cent of the odd positions, and of the triples a third has but two.
+// Upright triangles meet at edges only where those of the base mesh do. Taking them all leaves a
+// few in a hundred of the odd positions, and of the triples a third has but two.
 static void plan_triples(const pliant_hierarchy *hierarchy, const int32_t *position,
                          pliant_wavelet *w, plan_arrays *arrays, uint8_t *is_taken)
 {
@@ -249,9 +242,9 @@ static void plan_triples(const pliant_hierarchy *hierarchy, const int32_t *posit
         w->triple_offset[l] = triples;
         w->single_offset[l] = singles;
         for (int32_t f = 0; f < hierarchy->face_count[l]; f++) {
-            triangle found;
+            if (!is_upright(l, f)) continue;
+            const triangle found = find_triangle(hierarchy, l, f);
             pliant_wavelet_triple placed;
-            if (!is_upright(l, f) || !find_triangle(hierarchy, l, f, &found)) continue;
             const int32_t wanted = place_triangle(&found, position, w->count, is_taken, &placed);
             if (wanted < 2) continue;
             for (int32_t i = 0; i < wanted; i++) is_taken[placed.odd[i] / 2] = 1;

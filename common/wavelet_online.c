@@ -1,17 +1,16 @@
 // wavelet_online.c: the inverse transform as it runs in every frame, on rows of four floats.
 //
-// It reads rows of 16 bytes all over arrays that fit the first two caches, so its time is that of load
-// instructions: those of rows, and as many of row numbers. Measured at 2143 nodes (Sapphire Rapids,
-// three loads a cycle), whole transform:
+// It reads rows of 16 bytes all over arrays that fit the first two caches, so its time is that of
+// load instructions: those of rows, and as many of row numbers. Measured at 2143 nodes (Sapphire
+// Rapids, three loads a cycle), whole transform:
 //
-//     butterfly    4.1 us   a stencil of eight row numbers for every odd position
-//                  3.4      the numbers multiplied out, 16 or 32 bits
-//                  2.8      odd positions in threes that share rows (pliant_wavelet_triple), 32 bits
-//                  2.4      the same with 16 bits
-//     linear       1.3, with fused products 1.15 (16 bits: 1.13)
-//     the update   2.1, gathered by parent; scattered from the odd rows twice that, because every
-//                  scatter reads a row that another has just written
-//
+//     butterfly   4.1 us  a stencil of eight row numbers for every odd position
+//                 3.4     the numbers multiplied out, 16 or 32 bits
+//                 2.8     odd positions in threes that share rows (pliant_wavelet_triple), 32 bits
+//                 2.5     the same with 16 bits
+//     linear      1.3     with fused products 1.15; numbers multiplied out 1.13
+//     the update  2.1     gathered by parent; scattered from the odd rows twice that, because every
+//                         scatter reads a row that another has just written
 #include "pliant/wavelet.h"
 
 #include "pliant/vector_clones.h"
@@ -40,7 +39,8 @@ INLINE void undo_update(const pliant_wavelet *w, int32_t l, row *restrict g)
 // x_m = gamma_m + sum_k w_mk x_k, with the weights as they are away from the border.
 INLINE void predict_linear(const pliant_wavelet *w, int32_t l, row *g)
 {
-    const int32_t *node = w->predict_node + 2 * (size_t)(w->level_offset[l + 1] - w->level_offset[1]);
+    const int32_t *node =
+        w->predict_node + 2 * (size_t)(w->level_offset[l + 1] - w->level_offset[1]);
     for (int32_t p = w->level_offset[l + 1]; p < w->level_offset[l + 2]; p++, node += 2)
         g[p] += 0.5f * (g[node[0]] + g[node[1]]);
 }

@@ -20,8 +20,8 @@ static double factor(const pliant_compression_result *r)
 
 static void print_text(const pliant_options *options, const pliant_run_summary *s)
 {
-    printf("%s: %d vertices in %d levels, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
-           s->level_count, s->free_count, s->fixed_count, s->file_bytes / 1e6);
+    printf("%s: %d vertices in %d level%s, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
+           s->level_count, s->level_count == 1 ? "" : "s", s->free_count, s->fixed_count, s->file_bytes / 1e6);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
         const pliant_compression_result *r = &s->results[b];
         if (r->dense == 0) continue;

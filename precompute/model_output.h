@@ -1,4 +1,4 @@
-// model_output.h: write the model file of INTERFACE 5 from the ranks' compressed columns.
+// model_output.h: write the model file from the ranks' compressed columns.
 #pragma once
 
 #include "greens.h"

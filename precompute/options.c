@@ -1,6 +1,8 @@
 // options.c: what the command line of pliant-precompute asks for.
 #include "options.h"
 
+#include "mesh/region.h"
+
 #include "pliant/error.h"
 
 #include <errno.h>
@@ -18,7 +20,8 @@ static const char help[] =
     "(OBJ, PLY, STL, OFF and more).\n"
     "\n"
     "Levels (wavelets need them)\n"
-    "  --subdivide L           take MESH as base mesh and split every triangle into four, L times\n"
+    "  --subdivide L           take MESH as base mesh and split every triangle into four, L times (0: as\n"
+    "                          it is, on one level, which stores every column whole)\n"
     "  --scheme SCHEME         loop, butterfly or midpoint (default loop)\n"
     "                          Without --subdivide, MESH is the finest level and its subdivision\n"
     "                          connectivity is detected, whatever its vertex order.\n"
@@ -34,8 +37,9 @@ static const char help[] =
     "  --density RHO           for gravity (default 1)\n"
     "  --method bem            discretisation: boundary elements (default)\n"
     "Compression\n"
-    "  --rms R, --max X        stay under these errors, either or both; the sparsest set is sought\n"
-    "                          (default --rms 0.02 --max 0.05: safe for fine contact)\n"
+    "  --rms R, --max X        stay under these errors (GF-70, GF-71), either or both; the sparsest set\n"
+    "                          is sought (default --rms 0.02 --max 0.05; thin parts under fine contact\n"
+    "                          want a smaller --max: the player says so when it matters)\n"
     "  --eps EPS               the paper's threshold instead (GF-31..33)\n"
     "  --wavelet WAVELET       linear or butterfly (default butterfly)\n"
     "  --no-lift               without the lifting update\n"
@@ -242,6 +246,14 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     if (!o.fixed_expression && !o.fixed_list)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "nothing holds the solid: give --fixed EXPR (such as 'z<0.1') or --fixed-list FILE");
+    if (o.fixed_expression) {
+        // A mistake in the expression is told before a mesh is read: try it on a mesh of nothing.
+        const pliant_mesh nothing = {0};
+        uint8_t none;
+        pliant_error inner;
+        if (pliant_region_evaluate(o.fixed_expression, &nothing, &none, &inner) < 0)
+            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--fixed: %.480s", inner.text);
+    }
     if (scheme_given && o.subdivide < 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--scheme goes with --subdivide L");
     if (o.compression.eps > 0 && (o.compression.rms > 0 || o.compression.max > 0))

@@ -80,15 +80,15 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
     const double needed = plan.matrix_bytes + plan.right_hand_bytes + plan.batch_bytes + work + kept;
     summary->memory_bytes = needed;
     const double here = needed * node_size / size, available = pliant_node_available();
-    const double spool = options->compression.eps > 0 ? 0 : rows * columns * 40 * node_size / size;
+    const double spool = options->compression.eps > 0 ? 0 : rows * columns * 44 * node_size / size;
 
     pliant_progress_note(progress,
-                         "%d vertices in %d levels, %d free and %d held; dense system of %d unknowns on "
-                         "%d ranks (%s)",
-                         p->vertex_count, p->multires->level_count, p->free_count, p->fixed_count,
-                         3 * p->vertex_count, size, plan.kind);
-    pliant_progress_note(progress, "memory %.2f GB (matrix %.2f, right-hand sides %.2f) of %.1f GB available; "
-                         "temporary columns up to %.2f GB in %s",
+                         "%d vertices in %d level%s, %d free and %d held; dense system of %d unknowns on "
+                         "%d rank%s (%s)",
+                         p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
+                         p->free_count, p->fixed_count, 3 * p->vertex_count, size, size == 1 ? "" : "s", plan.kind);
+    pliant_progress_note(progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available; "
+                         "temporary columns up to %.3g GB in %s",
                          needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9,
                          available / 1e9, spool / 1e9, folder);
     pliant_status status = PLIANT_OK;

@@ -1,6 +1,6 @@
 // columns.h: sparse block columns of one Green's function block, and the kernel that sums them.
 //
-// The kernel is the inner loop of steps (3) and (6) of FORMULAS 2 (GF-42, 45):
+// The kernel is the inner loop of GF-42 and GF-45:
 //
 //     g[row[e]] += block[e] * value        for the stored blocks e of one column
 //

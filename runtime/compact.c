@@ -79,7 +79,8 @@ void pliant_compact_fill(const pliant_columns *columns, pliant_compact_columns *
             to[0][i % 4][3] = (uint16_t)columns->row[e];
             for (int c = 0; c < 3 && i < count; c++)
                 for (int r = 0; r < 3; r++)
-                    to[c][i % 4][r] = pliant_half_from_float(columns->block[9 * e + 3 * (size_t)r + (size_t)c] * factor);
+                    to[c][i % 4][r] = pliant_half_from_float(
+                        columns->block[9 * e + 3 * (size_t)r + (size_t)c] * factor);
         }
         compact->offset[j + 1] = compact->offset[j] + groups;
     }
@@ -102,7 +103,15 @@ void pliant_compact_add_plain(const pliant_compact_group *group, size_t count, c
 }
 
 #if defined(__x86_64__) && defined(__GNUC__)
+#include <cpuid.h>
 #include <immintrin.h>
+
+// clang's __builtin_cpu_supports does not know F16C; AVX says that the system keeps the registers.
+int32_t pliant_half_in_hardware(void)
+{
+    unsigned a, b, c = 0, d;
+    return __get_cpuid(1, &a, &b, &c, &d) && (c & bit_F16C) && __builtin_cpu_supports("avx");
+}
 
 __attribute__((target("avx,f16c,fma"))) static void
 add_f16c(const pliant_compact_group *group, size_t count, const float *value, float *g)
@@ -147,7 +156,7 @@ add_avx512(const pliant_compact_group *group, size_t count, const float *value, 
 pliant_compact_kernel *pliant_compact_kernel_named(const char *name)
 {
     __builtin_cpu_init();
-    const int f16c = __builtin_cpu_supports("f16c") != 0 && __builtin_cpu_supports("fma") != 0;
+    const int f16c = pliant_half_in_hardware() && __builtin_cpu_supports("fma");
     if (strcmp(name, "avx512") == 0 && f16c && __builtin_cpu_supports("avx512f") &&
         __builtin_cpu_supports("avx512vl"))
         return add_avx512;
@@ -156,6 +165,11 @@ pliant_compact_kernel *pliant_compact_kernel_named(const char *name)
 }
 
 #else
+
+int32_t pliant_half_in_hardware(void)
+{
+    return 0;
+}
 
 pliant_compact_kernel *pliant_compact_kernel_named(const char *name)
 {

@@ -1,10 +1,10 @@
 // compact.h: a solver's own copy of sparse block columns in half precision, and its kernel.
 //
-// Blocks go in fours, for registers of sixteen numbers: a column of S is some 5 of these groups long,
-// and its kernel has one loop without a remainder (a branch that goes wrong costs as much as two
-// groups). A block takes 24 bytes, so that the columns of several contacts fit a core's cache.
-// Numbers are halves scaled by a power of two a column, whose largest lies in [2^14, 2^15): they are
-// rounded by 2^-11 of themselves, down to 2^-29 of the largest.
+// Blocks go in fours, for registers of sixteen numbers: a column of S is some 5 of these groups
+// long, and its kernel has one loop without a remainder (a branch that goes wrong costs as much as
+// two groups). A block takes 24 bytes, so that the columns of several contacts fit a core's cache.
+// Numbers are halves scaled by a power of two a column, whose largest lies in [2^14, 2^15): they
+// are rounded by 2^-11 of themselves, down to 2^-29 of the largest.
 #pragma once
 
 #include "columns.h"
@@ -28,6 +28,7 @@ typedef struct pliant_compact_columns {
 
 uint16_t pliant_half_from_float(float value);  // to nearest, ties to even
 float pliant_half_to_float(uint16_t half);
+int32_t pliant_half_in_hardware(void);  // 1: this machine converts them
 
 // Copy `columns`, which are stored and whose rows are under the limit.
 void pliant_compact_lay_out(pliant_arena *arena, const pliant_columns *columns,

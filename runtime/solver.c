@@ -1,6 +1,6 @@
 // solver.c: one boundary value problem on a model: its life and the capacitance matrix algorithm.
 //
-// The steps are those of GF-42..47 (FORMULAS 2). vbar outside S is summed into `base`, which stays
+// The steps are those of GF-42..47. vbar outside S is summed into `base`, which stays
 // from solve to solve: only what changed is added (GF-11, 12).
 #include "solver.h"
 
@@ -19,10 +19,11 @@ static const double unit_roundoff = 0x1p-24;
 // drift grows by 2 u a change, so this comes every 128th change or when a much larger load goes.
 static const double drift_limit = 256 * 0x1p-24;
 
-// Selective queries against the whole transform, at 2045 nodes, butterfly lifted (bench_solver):
-// the transform takes 6 us; a planned query 0.07 us for one node and 6.5 us for 128 scattered ones,
-// a sixteenth of them; making the plan 3.5 us for one node and 7 us for four, a 512th of them.
-enum { query_part = 16, query_floor = 16, query_at_once_part = 512, query_at_once_floor = 2 };
+// Selective queries against the whole transform, at 2143 nodes, butterfly (bench_solver): the
+// transform takes 2.5 us and lifted 4.5; a planned query 0.05 us for one node and 2.2 for 64
+// scattered ones, a 32nd of them, lifted 4; making the plan 2 us for one node and 2.8 for two, a
+// 1024th of them.
+enum { query_part = 32, query_floor = 16, query_at_once_part = 1024, query_at_once_floor = 2 };
 // Types kept at most: beyond, a search of the cache would cost what it saves.
 enum { cache_limit = 4096 };
 
@@ -64,6 +65,7 @@ static void lay_out(pliant_arena *arena, pliant_solver *solver)
     PLIANT_TAKE(arena, solver->solved, capacity);
     PLIANT_TAKE(arena, solver->reference, capacity);
     PLIANT_TAKE(arena, solver->key, capacity);
+    PLIANT_TAKE(arena, solver->terms, capacity);
     PLIANT_TAKE(arena, solver->contact_values, 3 * (size_t)capacity);
     PLIANT_TAKE(arena, solver->contact_solution, pliant_dense_stride(3 * (size_t)capacity));
     PLIANT_TAKE(arena, solver->loads, 2 * (size_t)solver->load_capacity);
@@ -86,7 +88,7 @@ pliant_solver_def pliant_solver_default(const pliant_model *model)
     return (pliant_solver_def){.constraint_capacity = 64,
                                .load_capacity = 256,
                                .cache_count = 4,
-                               .storage = PLIANT_STORAGE_HALF};
+                               .storage = PLIANT_STORAGE_FLOAT};
 }
 
 static float largest(const float *values, size_t count)
@@ -371,24 +373,39 @@ static void solve_contact(pliant_solver *solver, const pliant_capacitance *type)
 
 // ---- Step (6) ----
 
-// The columns of S may come in half precision: unlike `base` their sum does not enter q, and so no
-// force.
-static void add_contact_column(const pliant_solver *solver, int32_t row_domain, int32_t vertex,
-                               const float *value, float *rows)
+// Look up all columns of S before any is summed: the sums' loops then end on numbers that are at
+// hand, instead of guessing wrong and waiting for a look-up through the caches (31 ns a column of
+// 18 blocks against 27, in half precision 27 against 21), and the columns' first lines are on their
+// way.
+static void look_up(pliant_solver *solver, int32_t d)
 {
     const pliant_model *model = solver->model;
-    const pliant_compact_columns *compact = &solver->compact[row_domain][model->domain[vertex]];
-    if (!compact->offset) {
-        add_column(solver, row_domain, vertex, value, rows);
-        return;
+    for (int32_t i = 0; i < solver->solved_count; i++) {
+        const int32_t vertex = solver->solved[i].vertex, column = model->position[vertex];
+        const pliant_columns *columns = &model->greens[d][model->domain[vertex]];
+        const pliant_compact_columns *compact = &solver->compact[d][model->domain[vertex]];
+        const float scale = compact->offset ? compact->scale[column] : 1;
+        const uint64_t *offset = (compact->offset ? compact->offset : columns->offset) + column;
+        pliant_term *term = &solver->terms[i];
+        *term =
+            (pliant_term){.count = (size_t)(offset[1] - offset[0]),
+                          .value = {scale * solver->reference[i].x, scale * solver->reference[i].y,
+                                    scale * solver->reference[i].z}};
+        const char *begin;
+        if (compact->offset) {
+            term->group = compact->group + offset[0];
+            begin = (const char *)term->group;
+        } else {
+            term->row = columns->row + offset[0];
+            term->block = columns->block + 9 * offset[0];
+            begin = (const char *)term->block;
+            __builtin_prefetch(term->row);
+        }
+        for (int line = 0; line < 3; line++) __builtin_prefetch(begin + 64 * line);
     }
-    const int32_t column = model->position[vertex];
-    const float scale = compact->scale[column];
-    const float scaled[3] = {scale * value[0], scale * value[1], scale * value[2]};
-    const uint64_t begin = compact->offset[column], end = compact->offset[column + 1];
-    solver->add_compact(compact->group + begin, (size_t)(end - begin), scaled, rows);
 }
 
+// In half precision or not, the columns of S do not enter q, and so no force.
 void pliant_solver_sum(pliant_solver *solver, int32_t d)
 {
     pliant_field *field = &solver->fields[d];
@@ -396,11 +413,11 @@ void pliant_solver_sum(pliant_solver *solver, int32_t d)
     const size_t bytes = 4 * ((size_t)solver->model->domains[d].count + 1) * sizeof(float);
     if (field->is_loaded) memcpy(field->g, field->base, bytes);
     else memset(field->g, 0, bytes);
-    for (int32_t i = 0; i < solver->solved_count; i++) {
-        const float value[3] = {solver->reference[i].x, solver->reference[i].y,
-                                solver->reference[i].z};
-        add_contact_column(solver, d, solver->solved[i].vertex, value, field->g);
-    }
+    look_up(solver, d);
+    for (const pliant_term *term = solver->terms; term < solver->terms + solver->solved_count;
+         term++)
+        if (term->group) solver->add_compact(term->group, term->count, term->value, field->g);
+        else solver->add_column(term->row, term->block, term->count, term->value, field->g);
     field->is_summed = 1;
     field->reconstructed = 0;
 }

@@ -37,6 +37,15 @@ typedef struct pliant_field {
     int32_t *query_positions, *query_slots;  // shape [query_capacity]
 } pliant_field;
 
+// One column of S in step (6), looked up: from floats, or from groups.
+typedef struct pliant_term {
+    const pliant_compact_group *group;  // NULL: from floats
+    const int32_t *row;
+    const float *block;
+    size_t count;    // of groups or blocks
+    float value[3];  // times the column's scale
+} pliant_term;
+
 struct pliant_solver {
     const pliant_model *model;  // borrowed
     pliant_arena arena;
@@ -71,6 +80,7 @@ struct pliant_solver {
     int64_t solve_count;
     pliant_capacitance_scratch scratch;
     int32_t *key;             // shape [capacity]
+    pliant_term *terms;       // shape [capacity]
     float *contact_values;    // shape [3 capacity]: q of step (4)
     float *contact_solution;  // shape [stride]
     int32_t *query_scratch;   // shape [query_capacity]

@@ -5,8 +5,8 @@
 // written out. No lane looks at another, and each adds its elements in mesh order: a row's bits
 // do not depend on its neighbours.
 //
-// This follows: FORMULAS section 1; c(x) and the strongly singular integral from rigid translation,
-// as F. J. Rizzo and D. J. Shippy, An advanced boundary integral equation method for
+// This follows: C. A. Brebbia, J. C. F. Telles, L. C. Wrobel, Boundary Element Techniques, 1984;
+// c(x) and the strongly singular integral from rigid translation, as F. J. Rizzo and D. J. Shippy, An advanced boundary integral equation method for
 // three-dimensional thermoelasticity, Int. J. Numer. Methods Eng. 11, 1977, and others since.
 #include "bem/bem.h"
 

@@ -1,7 +1,7 @@
 // bem.h: collocation boundary elements for linear elastostatics, continuous linear triangles.
 //
 // c(x) u(x) + PV int T(x,y) u(y) dS = int U(x,y) p(y) dS becomes H u = G p at the vertices. With
-// the reference problem's unknowns moved left it reads A v = B vbar (FORMULAS 1):
+// the reference problem's unknowns moved left it reads A v = B vbar:
 //
 //     A = [ H at free columns | -G at fixed columns ]     v    = u at free nodes, p at fixed ones
 //     B = [ G at free columns | -H at fixed columns ]     vbar = p at free nodes, u at fixed ones

@@ -1,6 +1,7 @@
 // kelvin.c: Kelvin's fundamental solutions of linear elastostatics, the scalar reference.
 //
-// This follows: FORMULAS section 1, with r,i = r_i / |r| and mu = E / (2 (1 + nu)).
+// This follows: C. A. Brebbia, J. C. F. Telles, L. C. Wrobel, Boundary Element Techniques, 1984, with
+// r,i = r_i / |r| and mu = E / (2 (1 + nu)).
 #include "bem/kelvin.h"
 
 #include <math.h>

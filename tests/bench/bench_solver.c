@@ -1,8 +1,9 @@
 // bench_solver.c: what a played step costs, by part, against dense products on the same sizes.
 //
 // usage: bench_solver [MODEL.h5]      or PLIANT_BENCH_MODEL; default: a synthetic sphere, 2562
-// vertices. One thread, warm caches, another patch (of those whose inverse is cached) every frame;
-// medians in microseconds. The baseline is OpenBLAS on a random dense matrix of the model's size.
+// vertices. One thread, another patch (of the four whose inverses a solver caches by default) every
+// frame, warm caches or a second-level cache swept before every frame; medians in microseconds. The
+// baseline is OpenBLAS on a random dense matrix of the model's size.
 #include "synthetic_model.h"
 
 #include "capacitance.h"
@@ -26,6 +27,12 @@ extern void dgetri_(const int *n, double *a, const int *lda, const int *pivots, 
 
 enum { patch_count = 4, frame_count = 301, size_count = 5 };
 static const int32_t sizes[size_count] = {1, 10, 30, 100, 300};
+// What we want for sum and surface, in microseconds.
+static const double float_goal[size_count] = {5, 6, 8, 13, 25};
+static const double half_goal[size_count] = {2.5, 3, 3.5, 5, 10};
+static const double cold_goal[size_count] = {15, 15, 18, 25, 0};
+// More than a core's own caches hold; the last level is shared and often too large to sweep.
+enum { sweep_bytes = 16 << 20, cold_frame_count = 41 };
 
 static double now_us(void)
 {
@@ -179,10 +186,15 @@ typedef struct step_times {
     double blocks;  // stored blocks summed per step, mean over patches
 } step_times;
 
-static step_times time_steps(const pliant_model *model, int32_t s, pliant_vec3 *u)
+// `sweep`: NULL, or memory to read before every frame.
+static step_times time_steps(const pliant_model *model, int32_t s, pliant_storage storage,
+                             const volatile char *sweep, pliant_vec3 *u)
 {
-    const pliant_solver_def def = {
-        .constraint_capacity = s, .load_capacity = 16, .cache_count = patch_count, .storage=getenv("FL")?0:1};
+    const pliant_solver_def def = {.constraint_capacity = s,
+                                   .load_capacity = 16,
+                                   .cache_count = patch_count,
+                                   .storage = storage};
+    const int frames = sweep ? cold_frame_count : frame_count;
     pliant_solver *solver = NULL;
     pliant_error err = {""};
     require(pliant_solver_create(model, &def, &solver, &err), &err);
@@ -201,8 +213,9 @@ static step_times time_steps(const pliant_model *model, int32_t s, pliant_vec3 *
     static double contact[frame_count], sum[frame_count], surface[frame_count], step[frame_count];
     double build[patch_count];
     int rough = 0;
-    for (int frame = -2 * patch_count; frame < frame_count; frame++) {
+    for (int frame = -2 * patch_count; frame < frames; frame++) {
         const int k = (frame + 2 * patch_count) % patch_count;
+        for (size_t i = 0; sweep && i < sweep_bytes; i += 64) (void)sweep[i];
         const double begin = now_us();
         pliant_solver_release_all(solver);
         for (int32_t i = 0; i < s; i++)
@@ -224,11 +237,12 @@ static step_times time_steps(const pliant_model *model, int32_t s, pliant_vec3 *
         surface[frame] = (double)report.surface_ns * 1e-3;
         step[frame] = end - begin;
     }
-    if (rough) printf("  s = %d: %d of %d patches are rough\n", s, rough, patch_count);
-    result.contact = median(contact, frame_count);
-    result.sum = median(sum, frame_count);
-    result.surface = median(surface, frame_count);
-    result.step = median(step, frame_count);
+    if (rough && !sweep && storage == PLIANT_STORAGE_FLOAT)
+        printf("  s = %d: %d of %d patches are rough\n", s, rough, patch_count);
+    result.contact = median(contact, frames);
+    result.sum = median(sum, frames);
+    result.surface = median(surface, frames);
+    result.step = median(step, frames);
     result.build = median(build, patch_count);
     for (int k = 0; k < patch_count; k++) free(patches[k]);
     pliant_solver_destroy(solver);
@@ -353,11 +367,29 @@ int main(int argc, char **argv)
     float *dense_u = malloc(3 * (size_t)m * sizeof *dense_u);
     pliant_vec3 *u = malloc((size_t)info.vertex_count * sizeof *u);
     if (!matrix || !dense_u || !u) return fprintf(stderr, "bench_solver: no memory\n"), 1;
+    char *sweep = calloc(sweep_bytes, 1);
+    if (!sweep) return fprintf(stderr, "bench_solver: no memory\n"), 1;
     const double bandwidth = read_bandwidth(40 * nnz), transform = time_transform(model);
-    printf("transform %.2f us; %.1f MB of columns; read bandwidth over that much %.1f GB/s\n\n",
-           transform, 40e-6 * (double)nnz, bandwidth * 1e-9);
-    printf("    s  dense sgemv |  sum  ns/block  read-bound |  surface  pack | full surface  ratio "
-           "| contact   step\n");
+    const double dense_bytes = 36.0 * m * m, float_bytes = 40.0 * (double)nnz;
+    double half_bytes = 0;
+    for (int32_t j = 0; j < m; j++) {
+        const uint64_t *offset = model->greens[0][0].offset + j;
+        half_bytes += sizeof(pliant_compact_group) * (double)((offset[1] - offset[0] + 3) / 4);
+    }
+    printf(
+        "stored blocks: %.2f MB of floats, %.2f MB of halves: %.0f and %.0f times fewer bytes than "
+        "dense\n",
+        1e-6 * float_bytes, 1e-6 * half_bytes, dense_bytes / float_bytes, dense_bytes / half_bytes);
+    printf("transform %.2f us, packing and step (8) %.2f us; read bandwidth over the floats %.1f "
+           "GB/s\n\n",
+           transform, time_steps(model, 1, PLIANT_STORAGE_FLOAT, NULL, u).surface - transform,
+           bandwidth * 1e-9);
+    printf("       dense  |      sum of floats       | sum of halves | sum, transform, pack: "
+           "found/goal, "
+           "x dense | contact from |\n"
+           "    s  sgemv  |   us  ns/block read-bound |   us ns/block |    float      |     half   "
+           "   | "
+           "cold    | caches  cold | step\n");
     step_times steps[size_count];
     for (int i = 0; i < size_count && sizes[i] <= m; i++) {
         const int32_t s = sizes[i];
@@ -369,13 +401,20 @@ int main(int argc, char **argv)
             dense[frame] = time_dense(m, matrix, columns, s, dense_u);
         }
         free(columns);
-        steps[i] = time_steps(model, s, u);
-        const step_times t = steps[i];
-        const double full = t.sum + t.surface, baseline = median(dense, 101);
-        printf("%5d %12.1f | %5.2f %8.2f %10.2f | %8.2f %5.2f | %12.2f %6.1f | %7.2f %6.2f\n", s,
-               baseline, t.sum, 1e3 * t.sum / t.blocks, 40 * t.blocks / bandwidth * 1e6, t.surface,
-               t.surface - transform, full, baseline / full, t.contact, t.step);
+        const step_times t = steps[i] = time_steps(model, s, PLIANT_STORAGE_FLOAT, NULL, u);
+        const step_times half = time_steps(model, s, PLIANT_STORAGE_HALF, NULL, u);
+        const step_times cold = time_steps(model, s, PLIANT_STORAGE_FLOAT, sweep, u);
+        const double full = t.sum + t.surface, half_full = half.sum + half.surface;
+        const double baseline = median(dense, 101);
+        printf("%5d %7.1f | %5.2f %8.2f %9.2f | %5.2f %7.2f | %4.1f/%-4.0f %4.1f | %4.1f/%-4.1f "
+               "%4.1f | "
+               "%4.0f/%-3.0f | %6.2f %6.1f | %5.1f\n",
+               s, baseline, t.sum, 1e3 * t.sum / t.blocks, 40 * t.blocks / bandwidth * 1e6,
+               half.sum, 1e3 * half.sum / half.blocks, full, float_goal[i], baseline / full,
+               half_full, half_goal[i], baseline / half_full, cold.sum + cold.surface, cold_goal[i],
+               t.contact, cold.contact, t.step);
     }
+    free(sweep);
     free(matrix);
     printf("\nnew type, us: extraction (ns a block, first and again), all of it, against LAPACK\n"
            "    s     plan  extract  ns/block  again |  build | dgetrf  dgetrf+dgetri\n");

@@ -312,6 +312,62 @@ static void single_precision_and_online_transforms_agree_with_double(void **stat
     free_domain(&d);
 }
 
+// Every odd position of every level is predicted once, by a triple or by itself; returns the part of
+// them that is in triples.
+static double check_triples(const pliant_wavelet *w)
+{
+    int32_t *seen = calloc((size_t)w->count + 1, sizeof *seen);
+    assert_non_null(seen);
+    int32_t in_triples = 0;
+    for (int32_t l = 0; l + 1 < w->level_count; l++) {
+        for (int32_t i = w->triple_offset[l]; i < w->triple_offset[l + 1]; i++) {
+            const uint16_t *odd = w->triples[i].odd;
+            assert_true(odd[0] != odd[1] && odd[1] != odd[2]);
+            for (int k = 0; k < (odd[2] == odd[0] ? 2 : 3); k++, in_triples++) seen[odd[k] / 2]++;
+        }
+        for (int32_t i = w->single_offset[l]; i < w->single_offset[l + 1]; i++) seen[w->singles[i]]++;
+        for (int32_t p = w->level_offset[l + 1]; p < w->level_offset[l + 2]; p++)
+            assert_int_equal(seen[p], 1);
+    }
+    for (int32_t p = 0; p < w->level_offset[1]; p++) assert_int_equal(seen[p], 0);
+    free(seen);
+    return (double)in_triples / fmax(1, w->count - w->level_offset[1]);
+}
+
+static void butterflies_in_threes_equal_those_one_by_one(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(5);
+    // On the tetrahedron and the octahedron nodes of a stencil coincide.
+    domain domains[] = {make_domain(check_refine(check_tetrahedron(), 3), everywhere),
+                        make_domain(check_refine(check_octahedron(), 3), everywhere),
+                        make_domain(check_refine(check_torus(3, 5), 2), everywhere),
+                        make_domain(check_blob(4), everywhere), make_domain(check_blob(4), upper_part),
+                        make_domain(check_blob(1), upper_part)};
+    for (size_t i = 0; i < sizeof domains / sizeof *domains; i++) {
+        for (int lifted = 0; lifted < 2; lifted++) {
+            const pliant_wavelet_def def = {PLIANT_BUTTERFLY, (pliant_wavelet_lifting)lifted, PLIANT_ZERO};
+            pliant_wavelet *w = plan(&domains[i], domains[i].surface.areas, def);
+            assert_non_null(w->triples);
+            const double part = check_triples(w);
+            if (w->count > 1000) check_at_least(part, 0.9);
+            pliant_wavelet plain = *w;  // as in domains that triples do not reach
+            plain.triples = NULL;
+            float *x = (float *)rows(w, 4), *y = (float *)rows(w, 4);
+            for (size_t k = 0; k < 4 * (size_t)w->count; k++)
+                x[k] = y[k] = k % 4 == 3 ? 0 : (float)(2 * check_random_next(&random) - 1);
+            pliant_wavelet_inverse_online(w, w->level_count - 1, x);
+            pliant_wavelet_inverse_online(&plain, w->level_count - 1, y);
+            // A dozen float operations a level on values of size up to 10.
+            for (size_t k = 0; k < 4 * (size_t)w->count + 4; k++)
+                check_near(x[k], y[k], 100 * FLT_EPSILON);
+            free(x), free(y);
+            pliant_wavelet_destroy(w);
+        }
+        free_domain(&domains[i]);
+    }
+}
+
 static void small_and_empty_domains_work(void **state)
 {
     (void)state;
@@ -373,6 +429,7 @@ int main(void)
         cmocka_unit_test(linear_functions_have_no_details_on_a_flat_face_and_cubics_none_with_butterfly),
         cmocka_unit_test(coarse_levels_reconstruct_to_the_same_coarse_values),
         cmocka_unit_test(single_precision_and_online_transforms_agree_with_double),
+        cmocka_unit_test(butterflies_in_threes_equal_those_one_by_one),
         cmocka_unit_test(small_and_empty_domains_work),
         cmocka_unit_test(nodes_out_of_order_or_range_are_refused),
     };

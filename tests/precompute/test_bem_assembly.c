@@ -102,7 +102,7 @@ static void translations_give_no_traction(void **state)
     pliant_mesh_destroy(mesh);
 }
 
-// Exact but for quadrature: linear hats hold a rotation. FORMULAS 1 measures 1e-9.
+// Exact but for quadrature: linear hats hold a rotation. An independent reference measures 1e-9.
 static void rotations_give_no_traction(void **state)
 {
     (void)state;

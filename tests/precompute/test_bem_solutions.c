@@ -58,7 +58,7 @@ static void release(problem *q)
 }
 
 // The icosahedron put back on the unit sphere after every split: its triangles are more alike than
-// those of check_sphere, which FORMULAS' figures need (162 vertices: 2.2e-3 against 2.4e-3).
+// those of check_sphere, which the reference figures need (162 vertices: 2.2e-3 against 2.4e-3).
 static pliant_mesh *sphere_mesh(int32_t levels)
 {
     pliant_mesh *mesh = check_icosahedron();
@@ -169,8 +169,8 @@ static void add_kelvin_source(problem *q, const pliant_material *material)
     }
 }
 
-// FORMULAS 1: 6.4e-3, 2.2e-3, 6.6e-4 at 42, 162, 642 vertices with 16% of them fixed; at most 5%
-// more.
+// An independent reference reaches 6.4e-3, 2.2e-3, 6.6e-4 at 42, 162, 642 vertices with 16% of them
+// fixed; at most 5% more.
 static void a_kelvin_source_is_reproduced_at_second_order(void **state)
 {
     (void)state;
@@ -329,7 +329,7 @@ static void the_reaction_carries_the_weight(void **state)
 }
 
 // Maxwell-Betti: a_i Xi_ij = (a_j Xi_ji)^T for free i, j. Collocation keeps it to discretisation
-// error (0.4% at 2562 vertices, ANCHORS): it shrinks with refinement.
+// error (the reference: 0.4% at 2562 vertices): it shrinks with refinement.
 static void reciprocity_error_shrinks(void **state)
 {
     (void)state;

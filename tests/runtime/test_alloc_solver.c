@@ -91,8 +91,10 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
     pliant_solver *solver = NULL;
     check_ok(pliant_model_open(path, &model, &err), &err);
     unlink(path);
-    const pliant_solver_def def = {
-        .constraint_capacity = 100, .load_capacity = 50, .cache_count = 2};
+    const pliant_solver_def def = {.constraint_capacity = 100,
+                                   .load_capacity = 50,
+                                   .cache_count = 2,
+                                   .storage = PLIANT_STORAGE_HALF};
     check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
 
     const int32_t n = pliant_model_describe(model).vertex_count;

@@ -503,6 +503,49 @@ static void a_coherent_walk_of_100000_steps_does_not_drift(void **state)
     tear_down(&f);
 }
 
+static void
+half_precision_changes_no_force_and_displacements_by_less_than_its_rounding(void **state)
+{
+    (void)state;
+    fixture f = set_up(3, 0.02, pliant_wavelet_default(), CHECK_ALL_BLOCKS, roomy);
+    pliant_solver_def def = roomy;
+    def.storage = PLIANT_STORAGE_HALF;
+    pliant_solver *exact = f.solver, *half = NULL;
+    pliant_error err = {""};
+    check_ok(pliant_solver_create(f.model, &def, &half, &err), &err);
+    pliant_vec3 *expected = calloc((size_t)f.n, sizeof *expected);
+    pliant_vec3 *found = calloc((size_t)f.n, sizeof *found);
+    double worst = 0;
+    for (int trial = 0; trial < 20; trial++) {
+        for (int side = 0; side < 2; side++) {
+            check_random random = check_random_seed((uint64_t)trial);
+            check_problem ignored = check_problem_create(f.exact);
+            f.solver = side ? half : exact;
+            pliant_solver_release_all(f.solver);
+            specify_random(&f, &ignored, &random, trial % 2 ? with_displaced : 31, 5 + trial);
+            assert_true(pliant_solver_solve(f.solver) >= 0);
+            check_problem_destroy(&ignored);
+        }
+        const pliant_vec3 a = pliant_solver_contact_force(exact),
+                          b = pliant_solver_contact_force(half);
+        assert_memory_equal(&a, &b, sizeof a);
+        assert_int_equal(pliant_solver_surface(exact, f.finest, expected), PLIANT_OK);
+        assert_int_equal(pliant_solver_surface(half, f.finest, found), PLIANT_OK);
+        worst = fmax(worst, vector_difference(found, expected, f.n) / vector_size(expected, f.n));
+    }
+    print_message("displacements differ by at most %.2g of the largest\n", worst);
+    // Coefficients are rounded by 2^-12 on average and 2^-11 at most, independently; a displacement
+    // is a sum over s <= 24 nodes whose contributions may exceed the largest displacement
+    // severalfold.
+    check_at_most(worst, 16 * 0x1p-11);
+    check_at_least(worst, 0x1p-16);  // it is half precision that was compared
+    free(found);
+    free(expected);
+    f.solver = exact;
+    pliant_solver_destroy(half);
+    tear_down(&f);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -516,6 +559,8 @@ int main(void)
         cmocka_unit_test(chosen_vertices_equal_the_whole_surface),
         cmocka_unit_test(a_coarser_surface_is_the_partial_inverse),
         cmocka_unit_test(cached_types_repeat_to_the_bit_in_any_order_of_statements),
+        cmocka_unit_test(
+            half_precision_changes_no_force_and_displacements_by_less_than_its_rounding),
         cmocka_unit_test(a_coherent_walk_of_100000_steps_does_not_drift),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

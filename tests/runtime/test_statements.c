@@ -279,8 +279,8 @@ static void statements_show_only_after_the_next_solve(void **state)
 static void bad_definitions_are_refused(void **state)
 {
     (void)state;
-    const pliant_solver_def bad[] = {{0, 8, 1}, {-5, 8, 1}, {8, -1, 1},
-                                     {8, 8, 0}, {8, 8, -1}, {8, 8, INT32_MAX}};
+    const pliant_solver_def bad[] = {{0, 8, 1, 0}, {-5, 8, 1, 0}, {8, -1, 1, 0}, {8, 8, 1, 2},
+                                     {8, 8, 0, 0}, {8, 8, -1, 0}, {8, 8, INT32_MAX, 0}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         pliant_solver *solver = NULL;
         pliant_error err = {""};
@@ -292,7 +292,7 @@ static void bad_definitions_are_refused(void **state)
     pliant_solver *solver = NULL;
     assert_int_equal(pliant_solver_create(NULL, NULL, &solver, NULL), PLIANT_ERR_ARGUMENT);
     // No more than the mesh has room for: huge capacities are small ones.
-    const pliant_solver_def huge = {INT32_MAX, INT32_MAX, 1};
+    const pliant_solver_def huge = {INT32_MAX, INT32_MAX, 1, PLIANT_STORAGE_HALF};
     pliant_error err = {""};
     check_ok(pliant_solver_create(models[0], &huge, &solver, &err), &err);
     pliant_solver_destroy(solver);

@@ -33,7 +33,6 @@
 
 typedef enum pliant_status {
     PLIANT_OK = 0,
-    PLIANT_LATE = 1,            // the deadline came first: valid, on a coarser level
     PLIANT_ROUGH = 2,           // the compressed contact compliance lost definiteness: finite, unreliable
     PLIANT_ERR_ARGUMENT = -1,   // a value outside what the call accepts
     PLIANT_ERR_MEMORY = -2,     // allocation refused

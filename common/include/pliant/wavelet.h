@@ -43,9 +43,9 @@ pliant_wavelet_def pliant_wavelet_default(void);
 
 #define PLIANT_STENCIL_LIMIT 8
 
-// Up to three odd positions on the edges of one triangle, whose butterflies share most of their nodes:
-// on line 12 rows are read instead of 24. With T = (sum of corners) / 2 - (sum of across) / 16, the
-// prediction on the edge opposite to corner[k] is
+// Up to three odd positions on the edges of one triangle, whose butterflies share most of their
+// nodes: on line 12 rows are read instead of 24. With T = 1/2 (sum of corners) - 1/16 (sum of
+// across) the prediction on the edge opposite to corner[k] is
 //
 //     T - 3/8 corner[k] + 3/16 across[k] - 1/16 (outer[k][0] + outer[k][1])
 //
@@ -81,8 +81,9 @@ typedef struct pliant_wavelet {
     const int32_t *update_offset[PLIANT_LEVEL_LIMIT + 1];
     const int32_t *update_odd;
     const float *update_odd_weight;
-    // On line, for butterflies under zero extension in domains that triples reach: the odd positions
-    // of level l + 1 are triples triple_offset[l] .. triple_offset[l+1], and likewise singles.
+    // On line, for butterflies under zero extension in domains that triples reach: the odd
+    // positions of level l + 1 are those of triples triple_offset[l] .. triple_offset[l+1], and
+    // likewise singles.
     const pliant_wavelet_triple *triples;  // NULL: none
     const int32_t *singles;                // odd positions that are in no triple
     int32_t triple_offset[PLIANT_LEVEL_LIMIT + 1];

@@ -8,7 +8,7 @@
 
 #include "pliant/reader.h"
 
-// The columns of one level of one block: wavelet coefficients of the row domain (FORMULAS 3).
+// The columns of one level of one block: wavelet coefficients of the row domain.
 typedef struct pliant_greens_view {
     int32_t row_count;              // positions of the row domain: m or k
     int32_t column_count;           // column c belongs to position c of the column domain

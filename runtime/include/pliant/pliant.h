@@ -61,11 +61,11 @@ typedef struct pliant_node {
     int32_t level, vertex;
 } pliant_node;
 
-// How a solver keeps the columns that it sums at every solve. Half: a copy of its own in half
-// precision scaled by columns, 20 bytes a stored block (where the machine converts halves and a
-// domain has at most 65536 nodes; else as float). It changes displacements away from S by some 3e-4
-// of their size, which is a hundredth of what compression does; contact forces, and displacements at
-// S, not at all.
+// Where a solver reads the columns that it sums at every solve. Half: a copy of its own in half
+// precision, scaled by columns, 24 bytes a stored block; worth it from some 30 nodes in S on. Taken
+// where the machine converts halves, for domains of at most 65536 nodes; else as float. It changes
+// displacements away from S by some 3e-4 of the largest, a hundredth of what compression does, and
+// reactions likewise, but neither contact forces nor what is known at S.
 typedef enum pliant_storage {
     PLIANT_STORAGE_FLOAT = 0,  // the file's floats, mapped and shared: 40 bytes a stored block
     PLIANT_STORAGE_HALF = 1,
@@ -75,7 +75,7 @@ typedef struct pliant_solver_def {
     int32_t constraint_capacity;  // s: the capacitance matrix (GF-19) is 3s x 3s. Default 64
     int32_t load_capacity;  // nodes with a specified traction or support displacement. Default 256
     int32_t cache_count;    // boundary-value-problem types whose inverse is kept. Default 4
-    pliant_storage storage;  // Default PLIANT_STORAGE_HALF
+    pliant_storage storage;  // Default PLIANT_STORAGE_FLOAT
 } pliant_solver_def;
 PLIANT_API pliant_solver_def pliant_solver_default(const pliant_model *model);
 PLIANT_CALL pliant_status pliant_solver_create(const pliant_model *model,
