@@ -206,7 +206,11 @@ ifneq ($(HAVE_PNG),yes)
 TEST_SRC  := $(filter-out tests/runtime/test_draw.c,$(TEST_SRC))
 endif
 TESTS     := $(patsubst tests/%.c,$(OUT)/tests/%,$(filter $(wildcard tests/*/test_$(T).c),$(TEST_SRC)))
-BENCHES   := $(patsubst tests/%.c,$(OUT)/tests/%,$(sort $(wildcard tests/bench/bench_*.c)))
+BENCH_SRC := $(sort $(wildcard tests/bench/bench_*.c))
+ifneq ($(HAVE_PETSC),yes)
+BENCH_SRC := $(filter-out tests/bench/bench_bem.c tests/bench/bench_precompute.c,$(BENCH_SRC))
+endif
+BENCHES   := $(patsubst tests/%.c,$(OUT)/tests/%,$(BENCH_SRC))
 
 TEST_LIBS := $(LIB_support) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_play) $(LIB_info) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 $(OUT)/tests/precompute/%: $(OBJ)/tests/precompute/%.o $(LIB_support) $(LIB_precompute) $(LIB_pliant) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
@@ -220,8 +224,17 @@ tests: $(TESTS)  ## build the tests
 check: $(PROGRAMS) $(TESTS)  ## run the tests; T=pattern chooses (make check T=wavelet)
 	@$(if $(HAVE_CMOCKA),:,echo "tests need libcmocka-dev"; exit 1)
 	@PLIANT_BUILD=$(OUT) scripts/run-tests $(TESTS)
-bench: $(PROGRAMS) $(BENCHES)  ## run the benchmarks: figures against baselines measured in the same run
-	@for b in $(BENCHES); do echo "== $${b##*/}"; PLIANT_BUILD=$(OUT) $$b || exit 1; done
+# The sample at RMS 5%, MAX 11%, with the default wavelets and without their update.
+SAMPLE       := scripts/sample/whale.obj --subdivide 4 --fixed 'z<0.027' --young 50000 --poisson 0.4 --density 1000
+BENCH_MODELS := $(if $(HAVE_PETSC),$(OUT)/bench/sample-rms5.h5 $(OUT)/bench/sample-rms5-unlifted.h5)
+$(OUT)/bench/sample-rms5-unlifted.h5: WAVELET := --no-lift
+$(OUT)/bench/%.h5: $(OUT)/pliant-precompute
+	@mkdir -p $(@D); echo "  precompute $@"; . scripts/environment; \
+	    mpirun --quiet -n 2 $< -q --force --rms 0.05 --max 0.11 $(WAVELET) $(SAMPLE) -o $@
+bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS)  ## run the benchmarks: figures against baselines measured in the same run
+	@. scripts/environment; for b in $(BENCHES); do echo "== $${b##*/}"; \
+	    case $$b in */bench_solver) models="$(BENCH_MODELS)";; *) models="";; esac; \
+	    PLIANT_BUILD=$(OUT) $$b $$models || exit 1; done
 
 # libFuzzer needs clang; everything the target needs is compiled with the sanitizers.
 FUZZ_SECONDS ?= 60

@@ -10,7 +10,8 @@
 //                 2.5     the same with 16 bits
 //     linear      1.3     with fused products 1.15; numbers multiplied out 1.13
 //     the update  2.1     gathered by parent; scattered from the odd rows twice that, because every
-//                         scatter reads a row that another has just written
+//                         scatter reads a row that another has just written; but a scatter of few
+//                         rows costs next to nothing (a column or ten: 40 to 400 of them)
 #include "pliant/wavelet.h"
 
 #include "pliant/vector_clones.h"
@@ -33,6 +34,24 @@ INLINE void undo_update(const pliant_wavelet *w, int32_t l, row *restrict g)
         row sum = g[a];
         for (int32_t e = offset[a]; e < offset[a + 1]; e++) sum -= weight[e] * g[odd[e]];
         g[a] = sum;
+    }
+}
+
+// The same from the odd rows that `support` marks.
+INLINE void undo_update_of(const pliant_wavelet *w, int32_t l, const uint64_t *support, row *g)
+{
+    const int32_t begin = w->level_offset[l + 1], end = w->level_offset[l + 2];
+    for (int32_t word = begin / 64; 64 * word < end; word++) {
+        uint64_t bits = support[word];
+        if (64 * word < begin) bits &= ~UINT64_C(0) << (begin - 64 * word);
+        if (64 * word + 64 > end) bits &= ~UINT64_C(0) >> (64 * word + 64 - end);
+        for (; bits; bits &= bits - 1) {
+            const int32_t p = 64 * word + __builtin_ctzll(bits);
+            const size_t entry = 2 * (size_t)(p - w->level_offset[1]);
+            // A parent outside the domain is the zero row, with weight 0.
+            for (int k = 0; k < 2; k++)
+                g[w->update_node[entry + k]] -= (float)w->update_weight[entry + k] * g[p];
+        }
     }
 }
 
@@ -104,14 +123,28 @@ INLINE void predict_weighted(const pliant_wavelet *w, int32_t l, row *g)
     }
 }
 
-PLIANT_VECTOR_CLONES
-void pliant_wavelet_inverse_online(const pliant_wavelet *w, int32_t level, float *coefficients)
+INLINE void inverse(const pliant_wavelet *w, int32_t level, const uint64_t *support, row *g)
 {
-    row *g = (row *)coefficients;
     for (int32_t l = 0; l < level; l++) {
-        if (w->def.lifting == PLIANT_LIFTED) undo_update(w, l, g);
+        if (w->def.lifting == PLIANT_LIFTED) {
+            if (support) undo_update_of(w, l, support, g);
+            else undo_update(w, l, g);
+        }
         if (w->def.boundary == PLIANT_DROP) predict_weighted(w, l, g);
         else if (w->def.scheme == PLIANT_LINEAR) predict_linear(w, l, g);
         else predict_butterfly(w, l, g);
     }
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_wavelet_inverse_online(const pliant_wavelet *w, int32_t level, float *g)
+{
+    inverse(w, level, NULL, (row *)g);
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_wavelet_inverse_online_sparse(const pliant_wavelet *w, int32_t level,
+                                          const uint64_t *support, float *g)
+{
+    inverse(w, level, support, (row *)g);
 }

@@ -27,6 +27,8 @@ typedef struct pliant_field {
     int32_t is_loaded;  // 0: base is zero
     float *g;           // g of step (6), and then values up to level `reconstructed`
     int32_t is_summed;  // 0: g is stale and to be summed when asked for
+    uint64_t *support;  // shape [(count + 63) / 64]: a bit for every row that a column touched,
+    int32_t is_sparse;  // if these are few and base is zero
     int32_t reconstructed;  // 0: coefficients (which the values of level 0 are)
     double magnitude;       // sum over the specified values of |value| * weight: bounds |base|
     double drift;           // bound of the rounding error in base, in the same unit

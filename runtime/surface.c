@@ -21,7 +21,9 @@ static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
     pliant_field *field = &solver->fields[d];
     if (field->is_summed && field->reconstructed == level) return;
     pliant_solver_sum(solver, d);
-    pliant_wavelet_inverse_online(solver->model->domains[d].wavelet, level, field->g);
+    const pliant_wavelet *wavelet = solver->model->domains[d].wavelet;
+    if (field->is_sparse) pliant_wavelet_inverse_online_sparse(wavelet, level, field->support, field->g);
+    else pliant_wavelet_inverse_online(wavelet, level, field->g);
     field->reconstructed = level;
 }
 

@@ -1,6 +1,6 @@
 // bench_solver.c: what a played step costs, by part, against dense products on the same sizes.
 //
-// usage: bench_solver [MODEL.h5]      or PLIANT_BENCH_MODEL; default: a synthetic sphere, 2562
+// usage: bench_solver [MODEL.h5 ...]      default: a synthetic sphere, 2562
 // vertices. One thread, another patch (of the four whose inverses a solver caches by default) every
 // frame, warm caches or a second-level cache swept before every frame; medians in microseconds. The
 // baseline is OpenBLAS on a random dense matrix of the model's size.
@@ -331,6 +331,8 @@ static void time_queries(const pliant_model *model)
     pliant_solver_destroy(solver);
 }
 
+static int bench(const char *path);
+
 int main(int argc, char **argv)
 {
     // One thread for the baseline too, before OpenBLAS looks (it has as a rule looked by now: run
@@ -340,7 +342,15 @@ int main(int argc, char **argv)
         unsetenv("OPENBLAS_CORETYPE");
         execv("/proc/self/exe", argv);
     }
-    const char *path = argc > 1 ? argv[1] : getenv("PLIANT_BENCH_MODEL");
+    if (argc < 2) return bench(NULL);
+    for (int i = 1; i < argc; i++)
+        if (bench(argv[i]) != 0) return 1;
+    return 0;
+}
+
+// One model; NULL: the synthetic one.
+static int bench(const char *path)
+{
     char own_path[64] = "";
     if (!path) {
         snprintf(own_path, sizeof own_path, "/tmp/pliant_bench_solver_%d.h5", (int)getpid());
@@ -382,7 +392,7 @@ int main(int argc, char **argv)
         1e-6 * float_bytes, 1e-6 * half_bytes, dense_bytes / float_bytes, dense_bytes / half_bytes);
     printf("transform %.2f us, packing and step (8) %.2f us; read bandwidth over the floats %.1f "
            "GB/s\n\n",
-           transform, time_steps(model, 1, PLIANT_STORAGE_FLOAT, NULL, u).surface - transform,
+           transform, time_steps(model, 100, PLIANT_STORAGE_FLOAT, NULL, u).surface - transform,
            bandwidth * 1e-9);
     printf("       dense  |      sum of floats       | sum of halves | sum, transform, pack: "
            "found/goal, "

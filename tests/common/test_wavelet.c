@@ -312,6 +312,38 @@ static void single_precision_and_online_transforms_agree_with_double(void **stat
     free_domain(&d);
 }
 
+static void sparse_transform_is_the_online_one_where_rows_are_zero(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(6);
+    domain d = make_domain(check_blob(3), upper_part);
+    for (int i = 0; i < 8; i++) {
+        pliant_wavelet *w = plan(&d, d.surface.areas, variant(i));
+        const size_t words = ((size_t)w->count + 63) / 64, bytes = 4 * ((size_t)w->count + 1) * sizeof(float);
+        uint64_t *support = malloc(words * sizeof *support);
+        float *g = (float *)rows(w, 4), *full = (float *)rows(w, 4);
+        // From nothing to everything touched; touched rows may be zero all the same.
+        for (int part = 0; part <= 4; part++)
+            for (int32_t level = 0; level < w->level_count; level++) {
+                memset(support, 0, words * sizeof *support);
+                memset(g, 0, bytes);
+                for (int32_t p = 0; p < w->count; p++) {
+                    if (check_random_next(&random) * 4 >= part) continue;
+                    support[p / 64] |= UINT64_C(1) << p % 64;
+                    for (int c = 0; c < 3; c++) g[4 * p + c] = (float)(2 * check_random_next(&random) - 1);
+                }
+                memcpy(full, g, bytes);
+                pliant_wavelet_inverse_online(w, level, full);
+                pliant_wavelet_inverse_online_sparse(w, level, support, g);
+                // The same sums in another order.
+                for (int32_t k = 0; k < 4 * (w->count + 1); k++) check_near(g[k], full[k], 50 * FLT_EPSILON);
+            }
+        free(support), free(g), free(full);
+        pliant_wavelet_destroy(w);
+    }
+    free_domain(&d);
+}
+
 // Every odd position of every level is predicted once, by a triple or by itself; returns the part of
 // them that is in triples.
 static double check_triples(const pliant_wavelet *w)
@@ -429,6 +461,7 @@ int main(void)
         cmocka_unit_test(linear_functions_have_no_details_on_a_flat_face_and_cubics_none_with_butterfly),
         cmocka_unit_test(coarse_levels_reconstruct_to_the_same_coarse_values),
         cmocka_unit_test(single_precision_and_online_transforms_agree_with_double),
+        cmocka_unit_test(sparse_transform_is_the_online_one_where_rows_are_zero),
         cmocka_unit_test(butterflies_in_threes_equal_those_one_by_one),
         cmocka_unit_test(small_and_empty_domains_work),
         cmocka_unit_test(nodes_out_of_order_or_range_are_refused),

@@ -113,3 +113,7 @@ void pliant_wavelet_inverse_transpose_float(const pliant_wavelet *wavelet, int32
 // On line: g has shape [count + 1][4] floats, 16-byte aligned, xyz0 each, its last row zero. In
 // place inverse up to `level`.
 void pliant_wavelet_inverse_online(const pliant_wavelet *wavelet, int32_t level, float *g);
+// The same where few rows are nonzero: `support`, shape [(count + 63) / 64], has bit p % 64 of word
+// p / 64 set for every row p that may be. Undoing the update then costs by those rows alone.
+void pliant_wavelet_inverse_online_sparse(const pliant_wavelet *wavelet, int32_t level,
+                                          const uint64_t *support, float *g);
