@@ -4,6 +4,7 @@
 #include "mesh/region.h"
 
 #include "pliant/error.h"
+#include "pliant/option.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -146,32 +147,6 @@ static pliant_status word(const char *option, const char *text, const char *cons
     return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected %s, found '%s'", option, expected, text);
 }
 
-static pliant_status levels(const char *text, int32_t *value, pliant_error *err)
-{
-    char *end;
-    errno = 0;
-    const long number = strtol(text, &end, 10);
-    if (end == text || *end || errno || number < 0 || number >= PLIANT_LEVEL_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "--subdivide: expected a whole number from 0 to %d, found '%s'",
-                                PLIANT_LEVEL_LIMIT - 1, text);
-    *value = (int32_t)number;
-    return PLIANT_OK;
-}
-
-// getopt's own complaint, on one line of ours.
-static pliant_status complain(int code, char **argv, pliant_error *err)
-{
-    const char *given = argv[optind - 1];
-    if (code == ':')
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "option %s needs a value; see --help", given);
-    if (optopt > 0 && optopt < 256)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "unknown option -%c; see --help", optopt);
-    if (optopt)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "option %s takes no value; see --help", given);
-    return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "unknown option %s; see --help", given);
-}
-
 pliant_status pliant_options_parse(int argc, char **argv, pliant_options *options,
                                    pliant_options_action *action, pliant_error *err)
 {
@@ -205,7 +180,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case OPTION_DENSE: o.dense = optarg; break;
         case OPTION_FIXED: o.fixed_expression = optarg; break;
         case OPTION_FIXED_LIST: o.fixed_list = optarg; break;
-        case OPTION_SUBDIVIDE: status = levels(optarg, &o.subdivide, err); break;
+        case OPTION_SUBDIVIDE: status = pliant_option_integer("--subdivide", optarg, 0, PLIANT_LEVEL_LIMIT - 1, &o.subdivide, err); break;
         case OPTION_SCHEME:
             status = word("--scheme", optarg, schemes, 3, &choice, err);
             o.scheme = (pliant_subdivision_scheme)choice;
@@ -231,7 +206,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case OPTION_RMS: status = number("--rms", optarg, 0, 1, &o.compression.rms, err); break;
         case OPTION_MAX: status = number("--max", optarg, 0, 1, &o.compression.max, err); break;
         case OPTION_EPS: status = number("--eps", optarg, 0, 1, &o.compression.eps, err); break;
-        default: return complain(code, argv, err);
+        default: return pliant_option_refuse(code, argc, argv, long_options, err);
         }
     }
     if (status < 0) return status;

@@ -9,7 +9,7 @@ int main(int argc, char **argv)
     pliant_draw_options options;
     pliant_error err = {""};
     if (pliant_draw_options_parse(argc, argv, &options, &err) < 0) {
-        fprintf(stderr, "pliant-draw: %s (--help tells more)\n", err.text);
+        fprintf(stderr, "pliant-draw: %s\n", err.text);
         return 2;
     }
     if (options.help) return fputs(pliant_draw_options_help(), stdout) < 0 || fflush(stdout) != 0;

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include "pliant/error.h"
+#include "pliant/option.h"
 #include "raster.h"
 
 #include <errno.h>
@@ -218,15 +219,9 @@ pliant_status pliant_draw_options_parse(int argc, char **argv, pliant_draw_optio
     optind = 0;  // start afresh: tests parse more than once
     opterr = 0;
     for (;;) {
-        const int at = optind > 0 ? optind : 1;
         const int option = getopt_long(argc, argv, ":o:h", names, NULL);
         if (option == -1) break;
-        if (option == ':')
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected a value",
-                                    argv[optind - 1]);
-        if (option == '?')
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "unknown option '%s'",
-                                    argv[optind > at ? optind - 1 : at]);
+        if (option == ':' || option == '?') return pliant_option_refuse(option, argc, argv, names, err);
         const pliant_status status = read_option(option, optarg, options, err);
         if (status < 0) return status;
     }
@@ -234,11 +229,11 @@ pliant_status pliant_draw_options_parse(int argc, char **argv, pliant_draw_optio
     const int count = argc - optind;
     if (count < 1 || count > 2)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "expected MODEL.h5 [SCRIPT], found %d names", count);
+                                "expected MODEL.h5 [SCRIPT], found %d names; see --help", count);
     options->model = argv[optind];
     options->script = count == 2 ? argv[optind + 1] : NULL;
     if (!options->output || !*options->output)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected -o PICTURE.png");
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected -o PICTURE.png; see --help");
     if (!options->script && (options->step_count || options->sheet_columns))
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "steps need a SCRIPT");
     if (options->sheet_columns && !options->step_count && strcmp(options->script, "-") == 0)

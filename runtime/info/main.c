@@ -60,7 +60,7 @@ int main(int argc, char **argv)
     pliant_error err = {""};
     signal(SIGPIPE, SIG_IGN);  // a closed pipe is a write error like others
     if (pliant_info_options_parse(argc, argv, &options, &err) < 0) {
-        fprintf(stderr, "pliant-info: %s (--help tells more)\n", err.text);
+        fprintf(stderr, "pliant-info: %s\n", err.text);
         return EXIT_MISUSED;
     }
     if (options.help) {

@@ -3,9 +3,9 @@
 
 #include "mesh_export.h"
 #include "pliant/error.h"
+#include "pliant/option.h"
 #include "pliant/hierarchy.h"
 
-#include <errno.h>
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,19 +43,6 @@ static const struct option known[] = {
     {NULL, 0, NULL, 0},
 };
 
-static pliant_status parse_level(const char *text, int32_t *level, pliant_error *err)
-{
-    char *end;
-    errno = 0;
-    const long value = strtol(text, &end, 10);
-    if (end == text || *end != 0 || errno != 0 || value < 0 || value > PLIANT_LEVEL_LIMIT)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "--level: expected 0 to %d, found \"%.100s\"", PLIANT_LEVEL_LIMIT,
-                                text);
-    *level = (int32_t)value;
-    return PLIANT_OK;
-}
-
 pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_options *options,
                                         pliant_error *err)
 {
@@ -78,21 +65,13 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
             o.output = optarg;
             break;
         case OPTION_LEVEL:
-            status = parse_level(optarg, &o.level, err);
+            status = pliant_option_integer("--level", optarg, 0, PLIANT_LEVEL_LIMIT, &o.level, err);
             break;
         case OPTION_JSON:
             o.json = 1;
             break;
-        case ':':
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "%.100s: expected a value, found none", argv[optind - 1]);
         default:
-            // getopt leaves the letter in optopt, or 0 for a long option.
-            if (optopt > 0 && optopt < 256)
-                return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "-%c: unknown option", optopt);
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "%.100s: unknown, ambiguous or with a value it does not take",
-                                    argv[optind - 1]);
+            return pliant_option_refuse(c, argc, argv, known, err);
         }
         if (o.help || o.version) {
             *options = o;
@@ -101,7 +80,7 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
     }
     if (status < 0) return status;
     if (argc - optind != 1)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected one file, found %d",
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected one file, found %d; see --help",
                                 argc - optind);
     o.path = argv[optind];
     if (o.level >= 0 && !o.output)

@@ -4,8 +4,8 @@
 #include "crew.h"
 
 #include "pliant/error.h"
+#include "pliant/option.h"
 
-#include <errno.h>
 #include <getopt.h>
 #include <stdlib.h>
 #include <string.h>
@@ -111,20 +111,6 @@ static const struct option long_options[] = {
 
 static const int32_t repeat_limit = 1000000000;
 
-static pliant_status parse_count(const char *option, const char *text, int32_t least, int32_t most,
-                                 int32_t *value, pliant_error *err)
-{
-    char *end;
-    errno = 0;
-    const long found = strtol(text, &end, 10);
-    if (end == text || *end || errno || found < least || found > most)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "%s: expected a number from %d to %d, found '%.60s'", option,
-                                (int)least, (int)most, text);
-    *value = (int32_t)found;
-    return PLIANT_OK;
-}
-
 static pliant_status parse_path(const char *option, const char *text, const char **path,
                                 pliant_error *err)
 {
@@ -133,24 +119,6 @@ static pliant_status parse_path(const char *option, const char *text, const char
                                 option);
     *path = text;
     return PLIANT_OK;
-}
-
-// What getopt did not like: an option that is unknown, ambiguous, or has a value too many or too
-// few.
-static pliant_status refuse_option(int found, int argc, char **argv, pliant_error *err)
-{
-    const char *text = optind > 0 && optind <= argc ? argv[optind - 1] : "";
-    if (found == ':')
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.60s: expected a value, found nothing",
-                                text);
-    for (const struct option *o = long_options; optopt && o->name; o++)
-        if (o->val == optopt && o->has_arg == no_argument)
-            return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                    "--%s: expected no value, found %.60s", o->name, text);
-    if (optopt > 0 && optopt < 256)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "-%c: unknown option; see --help",
-                                optopt);
-    return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%.60s: unknown option; see --help", text);
 }
 
 static pliant_status parse_option(int found, pliant_play_options *o, pliant_error *err)
@@ -172,11 +140,11 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
         return PLIANT_OK;
     case OPTION_LOD:
         // How many levels there are, the model will say.
-        return parse_count("--lod", optarg, 0, INT32_MAX, &o->level, err);
+        return pliant_option_integer("--lod", optarg, 0, INT32_MAX, &o->level, err);
     case OPTION_REPEAT:
-        return parse_count("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
+        return pliant_option_integer("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
     case OPTION_THREADS:
-        return parse_count("--threads", optarg, 1, PLIANT_CREW_LIMIT, &o->threads, err);
+        return pliant_option_integer("--threads", optarg, 1, PLIANT_CREW_LIMIT, &o->threads, err);
     case OPTION_COMPARE:
         return parse_path("--compare", optarg, &o->compare, err);
     case OPTION_JSON:
@@ -245,7 +213,7 @@ pliant_status pliant_play_options_parse(int argc, char **argv, pliant_play_optio
     optind = 0;  // from the start, also the second time
     *request = PLIANT_PLAY_RUN;
     for (int found; (found = getopt_long(argc, argv, ":o:qh", long_options, NULL)) != -1;) {
-        if (found == '?' || found == ':') return refuse_option(found, argc, argv, err);
+        if (found == '?' || found == ':') return pliant_option_refuse(found, argc, argv, long_options, err);
         if (found == 'h' || found == OPTION_VERSION) {
             *request = found == 'h' ? PLIANT_PLAY_HELP : PLIANT_PLAY_VERSION;
             return PLIANT_OK;

@@ -290,13 +290,13 @@ static void misuse_exits_with_2_and_failure_with_1(void **state)
     check_answer(ask("a b"), 2, "pliant-info: expected one file, found 2");
     check_answer(ask("-x a"), 2, "pliant-info: -x: unknown option");
     check_answer(ask("--nonsense a"), 2, "pliant-info: --nonsense: unknown");
-    check_answer(ask("a --export"), 2, "pliant-info: --export: expected a value, found none");
+    check_answer(ask("a --export"), 2, "pliant-info: --export: expected a value, found nothing");
     check_answer(ask("--export out.stl a"), 2, "pliant-info: --export: expected a name that ends in .obj or .ply, found \"out.stl\"");
     check_answer(ask("--export dir.obj/out a"), 2, "expected a name that ends in .obj or .ply");
     check_answer(ask("--level 1 a"), 2, "pliant-info: --level: expected --export with it, found none");
-    check_answer(ask("--export a.obj --level x a"), 2, "pliant-info: --level: expected 0 to 15, found \"x\"");
-    check_answer(ask("--export a.obj --level -1 a"), 2, "pliant-info: --level: expected 0 to 15, found \"-1\"");
-    check_answer(ask("--json=3 a"), 2, "pliant-info: --json=3: unknown, ambiguous or with a value");
+    check_answer(ask("--export a.obj --level x a"), 2, "pliant-info: --level: expected a whole number from 0 to 15, found 'x'");
+    check_answer(ask("--export a.obj --level -1 a"), 2, "pliant-info: --level: expected a whole number from 0 to 15, found '-1'");
+    check_answer(ask("--json=3 a"), 2, "pliant-info: --json: expected no value, found --json=3");
     check_answer(ask("-- --json"), 1, "pliant-info: --json: No such file or directory");
     check_answer(ask("/tmp"), 1, "pliant-info: /tmp: expected a file, found a directory");
     check_answer(ask("Makefile"), 1, "pliant-info: Makefile: not a Pliant model");

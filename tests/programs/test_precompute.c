@@ -128,10 +128,10 @@ static void help_version_and_misuse_have_their_exit_status(void **state)
     const struct {
         const char *arguments, *part;
     } misuses[] = {
-        {"--subdivde 2 a.obj -o b.h5", "unknown option --subdivde"},
-        {"-x a.obj -o b.h5", "unknown option -x"},
-        {"--young", "--young needs a value"},
-        {"--force=yes a.obj", "takes no value"},
+        {"--subdivde 2 a.obj -o b.h5", "--subdivde: unknown option; see --help"},
+        {"-x a.obj -o b.h5", "-x: unknown option"},
+        {"--young", "--young: expected a value"},
+        {"--force=yes a.obj", "--force: expected no value"},
         {"--poisson 0.5 --fixed 'z<0' a.obj -o b.h5", "--poisson: expected a number over -1 and under 0.5, found 0.5"},
         {"--poisson -1 --fixed 'z<0' a.obj -o b.h5", "--poisson"},
         {"--young 0 a.obj", "--young: expected a number over 0"},

@@ -641,7 +641,7 @@ static void bad_options_are_refused_by_name(void **state)
         {"a.h5", "-o"},
         {"a.h5 b c -o d", "found 3 names"},
         {"a.h5 b -o", "-o: expected a value"},
-        {"a.h5 b -o d --sideways", "'--sideways'"},
+        {"a.h5 b -o d --sideways", "--sideways: unknown option"},
         {"a.h5 b -o d -x", "unknown option"},
         {"a.h5 b -o d --step", "--step: expected a value"},
         {"a.h5 b -o d --step -1", "--step"},
