@@ -108,6 +108,10 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
 
 // ---- The work ----
 
+// A factorization shows no progress: above this many operations, ten seconds of a fast core, it is
+// announced.
+static const double long_factor_flops = 5e11;
+
 // Rows are assembled a few vertices at a time, for the sake of progress.
 static const int32_t assembly_step = 16;
 
@@ -223,6 +227,11 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     PetscCallMPI(MPI_Barrier(comm));
     s->times.assemble = pliant_progress_end(progress);
 
+    const double unknowns = 3.0 * p->vertex_count, factor_flops = 2 * unknowns * unknowns * unknowns / 3;
+    const double columns = 3.0 * (options->blocks == PLIANT_BLOCKS_ALL ? p->vertex_count : p->free_count);
+    if (factor_flops > long_factor_flops)
+        pliant_progress_note(progress, "factor: %.1f TFLOP in one piece; the solves will take %.1f times that",
+                             factor_flops / 1e12, 2 * unknowns * unknowns * columns / factor_flops);
     pliant_progress_begin(progress, "factor", 0);
     int singular;
     PetscCall(pliant_dense_system_factor(h->system, &singular));

@@ -33,6 +33,8 @@ static const double max_slack = 0.94, rms_slack = 0.985;
 static const double finest_bracket = 1.03;
 // What the refit takes off RMS, before it has been measured.
 static const double refit_guess = 0.96;
+// Steps down after a search that ended on a miss, and where they end.
+static const double retreat = 0.9, smallest_retreat = 0.3;
 // No coefficient is this many times its column's peak: at this t nothing is kept for the column's sake.
 static const double everything = 16;
 
@@ -506,10 +508,13 @@ static pliant_status meet_rms(searcher *s, double exact_energy, pliant_kept_set 
         }
         T = next;
     }
-    // The trials ended on a miss. Without its refit gain, which varies, the best T passes for sure.
-    T = h.good > 0 ? 0.9 * h.good : 0;
-    (void)meet_max(s, T, 1);
-    return worst_status(keep_all(s, T, kept, outcome, err), s->comm);
+    // The trials ended on a miss: come down until it is none. T = 0 keeps all, without error.
+    const double start = h.good > 0 ? h.good : isinf(h.bad) ? 0 : retreat * h.bad;
+    for (T = start;; T = T > smallest_retreat * start ? retreat * T : 0) {
+        (void)meet_max(s, T, 1);
+        const pliant_status status = worst_status(keep_all(s, T, kept, outcome, err), s->comm);
+        if (status < 0 || T == 0 || sum_over_ranks(outcome->error_energy, s->comm) <= target) return status;
+    }
 }
 
 // ---- Setting up ----
