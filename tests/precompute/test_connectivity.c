@@ -1,6 +1,7 @@
 // test_connectivity.c: the levels of a mesh found again, whatever happened to its order.
 #include "check.h"
 
+#include "multires_hierarchy.h"
 #include "mesh/multires.h"
 #include "surfaces.h"
 
@@ -22,16 +23,6 @@ static pliant_multires *subdivide(const pliant_mesh *base, int32_t levels)
     pliant_error err;
     check_ok(pliant_multires_subdivide(base, levels, PLIANT_SUBDIVIDE_LOOP, &m, &err), &err);
     return m;
-}
-
-static pliant_hierarchy *hierarchy_of(const pliant_multires *m)
-{
-    pliant_hierarchy *h = NULL;
-    pliant_error err;
-    check_ok(pliant_hierarchy_create(m->level_count, m->vertex_count, m->mesh->face_count,
-                                     m->mesh->faces, m->parents, &h, &err),
-             &err);
-    return h;
 }
 
 // No level is found, and the message says that much and what to do.

@@ -1,6 +1,7 @@
 // test_subdivision.c: Loop, butterfly and midpoint refinement of closed meshes.
 #include "check.h"
 
+#include "multires_hierarchy.h"
 #include "mesh/multires.h"
 #include "surfaces.h"
 
@@ -18,16 +19,6 @@ static pliant_multires *subdivide(const pliant_mesh *base, int32_t levels,
     pliant_error err;
     check_ok(pliant_multires_subdivide(base, levels, scheme, &m, &err), &err);
     return m;
-}
-
-static pliant_hierarchy *hierarchy_of(const pliant_multires *m)
-{
-    pliant_hierarchy *h = NULL;
-    pliant_error err;
-    check_ok(pliant_hierarchy_create(m->level_count, m->vertex_count, m->mesh->face_count,
-                                     m->mesh->faces, m->parents, &h, &err),
-             &err);
-    return h;
 }
 
 #define BASES 8
