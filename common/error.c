@@ -18,6 +18,7 @@ const char *pliant_status_name(pliant_status status)
 {
     switch (status) {
     case PLIANT_OK: return "PLIANT_OK";
+    case PLIANT_LATE: return "PLIANT_LATE";
     case PLIANT_ROUGH: return "PLIANT_ROUGH";
     case PLIANT_ERR_ARGUMENT: return "PLIANT_ERR_ARGUMENT";
     case PLIANT_ERR_MEMORY: return "PLIANT_ERR_MEMORY";

@@ -26,6 +26,12 @@ size_t pliant_dense_stride(size_t n)
     return (n + PLIANT_DENSE_LANES - 1) / PLIANT_DENSE_LANES * PLIANT_DENSE_LANES;
 }
 
+size_t pliant_dense_leading(size_t n)
+{
+    const size_t stride = pliant_dense_stride(n);
+    return stride % 64 == 0 ? stride + PLIANT_DENSE_LANES : stride;
+}
+
 size_t pliant_dense_work_count(size_t n)
 {
     // A panel of all rows, and as many rows of all columns.
@@ -88,22 +94,23 @@ PLIANT_VECTOR_CLONES
 int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *work)
 {
     enum { panel = PLIANT_DENSE_PANEL };
+    const size_t rows = pliant_dense_stride(n);
     for (size_t k = 0; k < n; k += panel) {
         const size_t width = n - k < panel ? n - k : panel;
         for (size_t j = 0; j < width; j++)
-            for (size_t i = 0; i < k; i++) work[i + j * stride] = -matrix[k + j + i * stride];
-        multiply_add(stride - k, width, k, matrix + k, stride, work, stride,
+            for (size_t i = 0; i < k; i++) work[i + j * rows] = -matrix[k + j + i * stride];
+        multiply_add(rows - k, width, k, matrix + k, stride, work, rows,
                      matrix + k + k * stride, stride);
         for (size_t j = k; j < k + width; j++) {
             double *column = matrix + j * stride;
             if (!(column[j] > 0)) return 0;  // NaN is not positive either
             const double scale = 1 / sqrt(column[j]);
             if (!isfinite(scale)) return 0;
-            for (size_t i = j; i < stride; i++) column[i] *= scale;
+            for (size_t i = j; i < rows; i++) column[i] *= scale;
             for (size_t to = j + 1; to < k + width; to++) {
                 const double factor = column[to];
                 double *other = matrix + to * stride;
-                for (size_t i = k; i < stride; i++) other[i] -= factor * column[i];
+                for (size_t i = k; i < rows; i++) other[i] -= factor * column[i];
             }
         }
     }
@@ -124,6 +131,7 @@ static void swap_rows(size_t n, size_t stride, double *matrix, size_t a, size_t 
 INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, double *matrix,
                                int32_t *pivots, double *least, double *most)
 {
+    const size_t rows = pliant_dense_stride(n);
     for (size_t c = k; c < k + width; c++) {
         double *column = matrix + c * stride;
         size_t pivot = c;
@@ -137,14 +145,14 @@ INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, 
         *most = fmax(*most, magnitude);
         const double inverse = 1 / column[c];
         // The column itself becomes that of G: -column / pivot, and 1 / pivot at the pivot.
-        for (size_t i = 0; i < stride; i++) column[i] *= -inverse;
+        for (size_t i = 0; i < rows; i++) column[i] *= -inverse;
         column[c] = inverse;
         for (size_t to = k; to < k + width; to++) {
             if (to == c) continue;
             double *other = matrix + to * stride;
             const double factor = other[c];
             other[c] = 0;
-            for (size_t i = 0; i < stride; i++) other[i] += factor * column[i];
+            for (size_t i = 0; i < rows; i++) other[i] += factor * column[i];
         }
     }
     return 1;
@@ -156,19 +164,20 @@ PLIANT_VECTOR_CLONES
 double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *pivots, double *work)
 {
     enum { panel = PLIANT_DENSE_PANEL };
+    const size_t rows = pliant_dense_stride(n);
     double least = INFINITY, most = 0;
     for (size_t k = 0; k < n; k += panel) {
         const size_t width = n - k < panel ? n - k : panel;
         if (!eliminate_panel(n, stride, k, width, matrix, pivots, &least, &most)) return 0;
         for (size_t j = 0; j < n; j++) {
             if (j >= k && j < k + width) continue;
-            double *rows = matrix + k + j * stride, *kept = work + j * panel;
-            memcpy(kept, rows, width * sizeof *kept);
-            memset(rows, 0, width * sizeof *rows);
+            double *taken = matrix + k + j * stride, *kept = work + j * panel;
+            memcpy(kept, taken, width * sizeof *kept);
+            memset(taken, 0, width * sizeof *taken);
         }
         const double *t = matrix + k * stride;
-        multiply_add(stride, k, width, t, stride, work, panel, matrix, stride);
-        multiply_add(stride, n - k - width, width, t, stride, work + (k + width) * panel, panel,
+        multiply_add(rows, k, width, t, stride, work, panel, matrix, stride);
+        multiply_add(rows, n - k - width, width, t, stride, work + (k + width) * panel, panel,
                      matrix + (k + width) * stride, stride);
     }
     // (P A)^-1 P: the row swaps, undone on the columns, last first.
@@ -207,4 +216,27 @@ void pliant_dense_multiply(size_t n, size_t stride, const float *matrix, const f
     for (; j < n; j++)
         for (size_t i = 0; i < stride; i += 16)
             *(lane16 *)(y + i) += *(const lane16 *)(matrix + i + j * stride) * x[j];
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_dense_multiply_double(size_t n, size_t stride, const double *matrix, const double *x,
+                                  double *y)
+{
+    const size_t rows = pliant_dense_stride(n);
+    memset(y, 0, rows * sizeof *y);
+    size_t j = 0;
+    for (; j + 4 <= n; j += 4) {
+        const double *a = matrix + j * stride;
+        for (size_t i = 0; i < rows; i += 8) {
+            lane8 sum = *(lane8 *)(y + i), other;
+            sum += *(const lane8 *)(a + i) * x[j];
+            other = *(const lane8 *)(a + i + stride) * x[j + 1];
+            sum += *(const lane8 *)(a + i + 2 * stride) * x[j + 2];
+            other += *(const lane8 *)(a + i + 3 * stride) * x[j + 3];
+            *(lane8 *)(y + i) = sum + other;
+        }
+    }
+    for (; j < n; j++)
+        for (size_t i = 0; i < rows; i += 8)
+            *(lane8 *)(y + i) += *(const lane8 *)(matrix + i + j * stride) * x[j];
 }

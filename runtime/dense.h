@@ -5,6 +5,8 @@
 // frame may do. These kernels run on the caller's thread in memory the caller gives.
 //
 // Matrices are column-major with a leading dimension `stride`: element (i, j) at [i + j * stride].
+// Rows n .. pliant_dense_stride(n)-1 of a matrix of n rows are zero on entry and on return; kernels
+// do not look further, whatever the leading dimension.
 #pragma once
 
 #include "pliant/base.h"
@@ -18,6 +20,9 @@
 
 // Least stride for n rows.
 size_t pliant_dense_stride(size_t n);
+// A leading dimension for matrices that grow up to n rows: columns do not fall on the same cache
+// sets.
+size_t pliant_dense_leading(size_t n);
 // Elements of workspace that invert and definite need for n rows.
 size_t pliant_dense_work_count(size_t n);
 
@@ -26,9 +31,12 @@ size_t pliant_dense_work_count(size_t n);
 int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *work);
 
 // Invert in place, Gauss-Jordan with partial pivoting. Returns the smallest magnitude of a pivot
-// over the largest, 0 when a pivot vanished (the matrix is then garbage). Rows n .. stride-1 must
-// be zero and stay so. `pivots` has shape [n].
+// over the largest, 0 when a pivot vanished (the matrix is then garbage). `pivots` has shape [n].
 double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *pivots, double *work);
 
 // y = A x; `y` has shape [stride], 64-byte aligned: rows n .. stride-1 of A must be zero.
 void pliant_dense_multiply(size_t n, size_t stride, const float *matrix, const float *x, float *y);
+
+// y = A x in double; `y` has shape [pliant_dense_stride(n)].
+void pliant_dense_multiply_double(size_t n, size_t stride, const double *matrix, const double *x,
+                                  double *y);

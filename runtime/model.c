@@ -11,6 +11,8 @@
 static void lay_out(pliant_arena *arena, pliant_model *model)
 {
     PLIANT_TAKE(arena, model->areas, model->vertex_count);
+    for (int32_t l = 0; l < model->level_count; l++)
+        PLIANT_TAKE(arena, model->node_areas[l], model->hierarchy->vertex_count[l]);
     PLIANT_TAKE(arena, model->position, model->vertex_count);
     PLIANT_TAKE(arena, model->domain, model->vertex_count);
     PLIANT_TAKE(arena, model->from_source, model->vertex_count);
@@ -39,34 +41,31 @@ static void bind_columns(const pliant_greens_view *greens, pliant_columns *colum
 }
 
 // Blocks of one row domain are summed before they are transformed back, so they must have been
-// transformed alike.
+// transformed alike, whatever their level.
 static pliant_status bind_greens(pliant_model *model, pliant_error *err)
 {
     const pliant_model_view *view = &model->view;
-    const int32_t l = model->finest_level;
-    const char *name = pliant_reader_name(model->reader);
-    if (!view->greens[PLIANT_FREE_FREE][l].column_offset)
-        return pliant_error_set(
-            err, PLIANT_ERR_MISSING,
-            "%s: /greens/free-free: expected the columns of level %d, found none", name, l);
-    const int32_t has_supports = view->has_supports &&
-                                 view->greens[PLIANT_FREE_FIXED][l].column_offset &&
-                                 view->greens[PLIANT_FIXED_FREE][l].column_offset &&
-                                 view->greens[PLIANT_FIXED_FIXED][l].column_offset;
-    bind_columns(&view->greens[PLIANT_FREE_FREE][l], &model->greens[0][0]);
-    if (!has_supports) return PLIANT_OK;
-    bind_columns(&view->greens[PLIANT_FREE_FIXED][l], &model->greens[0][1]);
-    bind_columns(&view->greens[PLIANT_FIXED_FREE][l], &model->greens[1][0]);
-    bind_columns(&view->greens[PLIANT_FIXED_FIXED][l], &model->greens[1][1]);
-    if (!same_wavelet(wavelet_of(&view->greens[PLIANT_FREE_FREE][l]),
-                      wavelet_of(&view->greens[PLIANT_FREE_FIXED][l])) ||
-        !same_wavelet(wavelet_of(&view->greens[PLIANT_FIXED_FREE][l]),
-                      wavelet_of(&view->greens[PLIANT_FIXED_FIXED][l])))
-        return pliant_error_set(
-            err, PLIANT_ERR_FORMAT,
-            "%s: /greens: expected one wavelet for all columns of a row domain, "
-            "found two",
-            name);
+    const int32_t blocks = view->has_supports ? PLIANT_BLOCK_COUNT : 1;
+    for (int32_t l = 0; l < view->level_count; l++) {
+        if (!view->greens[PLIANT_FREE_FREE][l].column_offset) continue;
+        if (model->stored_levels == 0) model->coarsest_stored = l;
+        model->finest_stored = l;
+        model->stored_levels |= 1u << l;
+        for (int32_t b = 0; b < blocks; b++)
+            bind_columns(&view->greens[b][l], &model->greens[b / 2][b % 2][l]);
+    }
+    // The view has made sure that there is a level, and that each has all blocks or the first.
+    for (int32_t b = 0; b < blocks; b++) {
+        const pliant_greens_view *first = &view->greens[b / 2 * 2][model->finest_stored];
+        for (int32_t l = 0; l < view->level_count; l++)
+            if (view->greens[b][l].column_offset &&
+                !same_wavelet(wavelet_of(first), wavelet_of(&view->greens[b][l])))
+                return pliant_error_set(
+                    err, PLIANT_ERR_FORMAT,
+                    "%s: /greens/%s/level%d: expected one wavelet for all columns of a row domain, "
+                    "found two",
+                    pliant_reader_name(model->reader), pliant_block_text((pliant_block_name)b), l);
+    }
     return PLIANT_OK;
 }
 
@@ -86,6 +85,24 @@ static void index_vertices(pliant_model *model)
     }
 }
 
+static void sum_areas(pliant_model *model)
+{
+    const pliant_hierarchy *h = model->hierarchy;
+    const int32_t base = h->vertex_count[0];
+    for (int32_t l = model->finest_level; l >= 0; l--) {
+        const int32_t count = h->vertex_count[l];
+        const double *finer = l < model->finest_level ? model->node_areas[l + 1] : model->areas;
+        double *areas = model->node_areas[l];
+        for (int32_t v = 0; v < count; v++) areas[v] = finer[v];
+        if (l == model->finest_level) continue;
+        for (int32_t m = count; m < h->vertex_count[l + 1]; m++)
+            for (int side = 0; side < 2; side++) {
+                const int32_t parent = h->stencils[m - base].parents[side];
+                if (model->domain[parent] == model->domain[m]) areas[parent] += finer[m] / 2;
+            }
+    }
+}
+
 // Wavelet weights and nodal forces divide by areas.
 static pliant_status check_areas(const pliant_model *model, pliant_error *err)
 {
@@ -100,14 +117,14 @@ static pliant_status check_areas(const pliant_model *model, pliant_error *err)
 static pliant_status plan_domains(pliant_model *model, pliant_error *err)
 {
     const pliant_model_view *view = &model->view;
-    const int32_t l = model->finest_level;
+    const int32_t l = model->finest_stored;
     model->domains[PLIANT_DOMAIN_FREE] = (pliant_model_domain){
         .count = view->free_count, .nodes = view->free_nodes, .gravity = view->gravity_free};
     model->domains[PLIANT_DOMAIN_FIXED] = (pliant_model_domain){
         .count = view->fixed_count, .nodes = view->fixed_nodes, .gravity = view->gravity_fixed};
     for (int32_t d = 0; d < PLIANT_DOMAIN_COUNT; d++) {
         pliant_model_domain *domain = &model->domains[d];
-        const pliant_block_name block = d == PLIANT_DOMAIN_FIXED && model->greens[1][0].offset
+        const pliant_block_name block = d == PLIANT_DOMAIN_FIXED && view->has_supports
                                             ? PLIANT_FIXED_FREE
                                             : PLIANT_FREE_FREE;
         const pliant_wavelet_def def = wavelet_of(&view->greens[block][l]);
@@ -137,6 +154,7 @@ static pliant_status derive(pliant_model *model, pliant_error *err)
     status = plan_domains(model, err);
     if (status < 0) return status;
     index_vertices(model);
+    sum_areas(model);
     return PLIANT_OK;
 }
 
@@ -194,7 +212,7 @@ pliant_status pliant_model_verify(const pliant_model *model, pliant_error *err)
 pliant_model_info pliant_model_describe(const pliant_model *model)
 {
     const pliant_model_view *view = &model->view;
-    const double *summary = view->greens[PLIANT_FREE_FREE][model->finest_level].summary;
+    const double *summary = view->greens[PLIANT_FREE_FREE][model->finest_stored].summary;
     return (pliant_model_info){
         .vertex_count = view->vertex_count,
         .face_count = view->face_count,
@@ -207,8 +225,69 @@ pliant_model_info pliant_model_describe(const pliant_model *model)
         .rms = summary[PLIANT_SUMMARY_RMS],
         .max = summary[PLIANT_SUMMARY_MAX],
         .factor = summary[PLIANT_SUMMARY_FACTOR],
-        .has_supports = model->greens[1][1].offset != NULL,
+        .has_supports = view->has_supports,
+        .coarsest_constraint_level = model->coarsest_stored,
+        .finest_constraint_level = model->finest_stored,
     };
+}
+
+pliant_level_info pliant_model_level(const pliant_model *model, int32_t level)
+{
+    if (level < 0 || level > model->finest_level) return (pliant_level_info){0};
+    pliant_level_info info = {.vertex_count = model->hierarchy->vertex_count[level]};
+    if (!(model->stored_levels >> level & 1)) return info;
+    const pliant_greens_view *greens = &model->view.greens[PLIANT_FREE_FREE][level];
+    info.column_count = greens->column_count;
+    info.rms = greens->summary[PLIANT_SUMMARY_RMS];
+    info.max = greens->summary[PLIANT_SUMMARY_MAX];
+    info.factor = greens->summary[PLIANT_SUMMARY_FACTOR];
+    info.smallest_eigenvalue = greens->summary[PLIANT_SUMMARY_RESERVED];
+    return info;
+}
+
+pliant_status pliant_model_check_node(const pliant_model *model, pliant_node node)
+{
+    if (node.level < 0 || node.level > model->finest_level || node.vertex < 0 ||
+        node.vertex >= model->hierarchy->vertex_count[node.level])
+        return PLIANT_ERR_ARGUMENT;
+    return model->stored_levels >> node.level & 1 ? PLIANT_OK : PLIANT_ERR_MISSING;
+}
+
+int32_t pliant_model_hats_at(const pliant_model *model, int32_t level, int32_t vertex,
+                             int32_t *vertices, float *weights)
+{
+    const pliant_hierarchy *h = model->hierarchy;
+    const int32_t base = h->vertex_count[0], coarse = h->vertex_count[level];
+    // From fine to coarse, the highest number first, a vertex hands half its weight to each parent
+    // (GF-53). What has weight between two levels are corners of one triangle: three of the finer
+    // level, which give way to three of the coarser one by one.
+    int32_t at[6] = {vertex}, count = 1;
+    float weight[6] = {1};
+    while (count > 0) {
+        int32_t finest = 0;
+        for (int32_t k = 1; k < count; k++)
+            if (at[k] > at[finest]) finest = k;
+        const int32_t v = at[finest];
+        if (v < coarse) break;
+        const float half = weight[finest] / 2;
+        at[finest] = at[--count], weight[finest] = weight[count];
+        for (int side = 0; side < 2; side++) {
+            const int32_t parent = h->stencils[v - base].parents[side];
+            if (model->domain[parent] != model->domain[vertex]) continue;
+            int32_t k = 0;
+            while (k < count && at[k] != parent) k++;
+            if (k == count) at[count] = parent, weight[count++] = 0;
+            weight[k] += half;
+        }
+    }
+    for (int32_t k = 0; k < count; k++) vertices[k] = at[k], weights[k] = weight[k];
+    return count;
+}
+
+double pliant_model_node_area(const pliant_model *model, pliant_node node)
+{
+    const pliant_status status = pliant_model_check_node(model, node);
+    return status == PLIANT_ERR_ARGUMENT ? 0 : model->node_areas[node.level][node.vertex];
 }
 
 int32_t pliant_model_level_vertex_count(const pliant_model *model, int32_t level)
@@ -247,12 +326,14 @@ double pliant_model_area(const pliant_model *model, int32_t vertex)
     return vertex < 0 || vertex >= model->vertex_count ? 0 : model->areas[vertex];
 }
 
-int32_t pliant_model_nearest(const pliant_model *model, const double *position)
+int32_t pliant_model_nearest_on(const pliant_model *model, int32_t level, const double *position)
 {
+    if (level < 0 || level > model->finest_level) return -1;
     const pliant_model_domain *domain = &model->domains[PLIANT_DOMAIN_FREE];
+    const int32_t count = domain->wavelet->level_offset[level + 1];
     int32_t nearest = -1;
     double least = 0;
-    for (int32_t p = 0; p < domain->count; p++) {
+    for (int32_t p = 0; p < count; p++) {
         const double *x = model->view.vertices + 3 * (size_t)domain->nodes[p];
         double distance = 0;
         for (int c = 0; c < 3; c++) distance += (x[c] - position[c]) * (x[c] - position[c]);
@@ -261,4 +342,9 @@ int32_t pliant_model_nearest(const pliant_model *model, const double *position)
         least = distance;
     }
     return nearest;
+}
+
+int32_t pliant_model_nearest(const pliant_model *model, const double *position)
+{
+    return pliant_model_nearest_on(model, model->finest_level, position);
 }

@@ -23,13 +23,34 @@ struct pliant_model {
     pliant_hierarchy *hierarchy;
     pliant_model_view view;
     int32_t level_count, vertex_count, finest_level;
+    // Levels that have columns: bit l of the mask, and the ends of what is set.
+    uint32_t stored_levels;
+    int32_t coarsest_stored, finest_stored;
     pliant_model_domain domains[PLIANT_DOMAIN_COUNT];
-    // Columns of the finest level, [row domain][column domain]; offset NULL: not stored.
-    pliant_columns greens[PLIANT_DOMAIN_COUNT][PLIANT_DOMAIN_COUNT];
+    // Columns of every level, [row domain][column domain][level]; offset NULL: not stored.
+    pliant_columns greens[PLIANT_DOMAIN_COUNT][PLIANT_DOMAIN_COUNT][PLIANT_LEVEL_LIMIT + 1];
 
     pliant_arena arena;
-    double *areas;         // shape [n]
+    double *areas;         // shape [n], a_i of the finest level
+    // Integrals of the hats of each level within their domains, shape [|K(l)|] (GF-53):
+    //     A_k(l) = A_k(l+1) + 1/2 sum of A_m(l+1) over the odd children m of k in k's domain
+    double *node_areas[PLIANT_LEVEL_LIMIT + 1];
     int32_t *position;     // shape [n]: of a vertex in its domain
     uint8_t *domain;       // shape [n]: of a vertex
     int32_t *from_source;  // shape [n]: model vertex of an input vertex, or -1
 };
+
+// The columns that a node's hat is a column of, on the rows of a domain; its column there.
+static inline const pliant_columns *pliant_model_columns(const pliant_model *model,
+                                                         int32_t row_domain, pliant_node node)
+{
+    return &model->greens[row_domain][model->domain[node.vertex]][node.level];
+}
+
+// Is it a node with columns? PLIANT_ERR_ARGUMENT: no such node; PLIANT_ERR_MISSING: not stored.
+pliant_status pliant_model_check_node(const pliant_model *model, pliant_node node);
+
+// The hats of `level` that are not zero at a vertex, within its domain: at most three (it lies in
+// one triangle of the level). Returns their number; `vertices` and `weights` have shape [3].
+int32_t pliant_model_hats_at(const pliant_model *model, int32_t level, int32_t vertex,
+                             int32_t *vertices, float *weights);

@@ -3,17 +3,18 @@
 
 #include "capacitance.h"
 #include "compact.h"
+#include "cost.h"
 #include "model.h"
 
 // A node of S: its specified value, and after a solve the one of reference type that realises it.
 typedef struct pliant_constraint {
-    int32_t vertex;
+    pliant_node node;
     pliant_vec3 value;  // displacement of a displaced node, traction of a freed one
 } pliant_constraint;
 
 // A node outside S with a specified value: traction of a free node, displacement of a fixed one.
 typedef struct pliant_load {
-    int32_t vertex;
+    pliant_node node;
     int32_t is_specified;  // 0: released, but still in the sum until the next solve
     pliant_vec3 value;     // as stated
     pliant_vec3 summed;    // as it is in base, which is as it was in the last solve
@@ -52,28 +53,32 @@ struct pliant_solver {
     const pliant_model *model;  // borrowed
     pliant_arena arena;
     pliant_columns_kernel *add_column;
-    // Columns of S in half precision, [row domain][column domain]; offset NULL: summed from floats.
+    // Columns of S in half precision, [row domain][column domain][level]; offset NULL: summed from
+    // floats.
     pliant_compact_kernel *add_compact;  // NULL: all are
-    pliant_compact_columns compact[PLIANT_DOMAIN_COUNT][PLIANT_DOMAIN_COUNT];
+    pliant_compact_columns compact[PLIANT_DOMAIN_COUNT][PLIANT_DOMAIN_COUNT]
+                                  [PLIANT_LEVEL_LIMIT + 1];
     int32_t domain_count;  // domains with rows: 2 with supports, else 1
     int32_t constraint_capacity, load_capacity, cache_count;
     int32_t query_capacity, query_at_once;  // see solver.c
 
     // Statements.
     int32_t constraint_count;
-    pliant_constraint *constraints;  // shape [capacity], vertices ascending
+    pliant_constraint *constraints;  // shape [capacity], vertices ascending; a vertex has one level
     int32_t load_count;              // also those released since the last solve
     int32_t specified_count;         // without them
     pliant_load *loads;              // shape [2 load_capacity]
-    int32_t *load_of;                // shape [n]: load of a vertex, or -1
+    int32_t *load_of;                // shape [n]: load that a vertex's node has now, or -1
     int32_t loads_changed;
     pliant_vec3 gravity, summed_gravity;
 
     // The last solve.
     int32_t solved_count;
-    pliant_constraint *solved;  // shape [capacity]
+    pliant_constraint *solved;  // shape [capacity], vertices ascending: S as it was resolved
     pliant_vec3 *reference;     // shape [capacity]: g_S of step (5)
-    float *fixed_displacement;  // shape [k][4]: supports
+    const pliant_capacitance *solved_type;  // NULL: S is empty
+    float *fixed_displacement;  // shape [k][4]: supports of the finest level
+    uint32_t used_levels[PLIANT_DOMAIN_COUNT];  // levels of loads and S in a domain, as bits
     pliant_field fields[PLIANT_DOMAIN_COUNT];
     pliant_solver_report report;
 
@@ -81,7 +86,11 @@ struct pliant_solver {
     pliant_capacitance *types;  // shape [cache_count]
     int64_t solve_count;
     pliant_capacitance_scratch scratch;
-    int32_t *key;             // shape [capacity]
+    pliant_capacitance extended;  // S and the nodes of pliant_solver_compliance
+    double compliance_shift;      // of its answers, while contact lasts
+    pliant_cost cost;
+    pliant_constraint *candidate;  // shape [capacity]: S on a coarser level
+    pliant_node *key;              // shape [capacity]
     pliant_term *terms;       // shape [capacity]
     float *contact_values;    // shape [3 capacity]: q of step (4)
     float *contact_solution;  // shape [stride]
@@ -93,8 +102,20 @@ struct pliant_solver {
 // index.
 int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t count, int32_t vertex);
 
+// statements.c: the load of this very node, as long as it is in the sum, or -1; take one off the
+// list.
+int32_t pliant_loads_find(const pliant_solver *solver, pliant_node node);
+void pliant_loads_forget(pliant_solver *solver, int32_t load);
+
+// Step (3), base.c: bring `base` up to date with the loads.
+void pliant_solver_update_base(pliant_solver *solver);
+// What is specified at a vertex of a domain outside its rows, as in the last solve: tractions of
+// free ones, displacements of fixed ones; loads and what S solved for, through their hats.
+pliant_vec3 pliant_solver_boundary_value(const pliant_solver *solver, int32_t vertex);
+
+// Step (2), types.c: resolve the constraints so that the solve ends by `deadline` and have the type
+// of that set. solver->solved and solved_count become the set; the report is filled in.
+const pliant_capacitance *pliant_solver_resolve(pliant_solver *solver, int64_t deadline);
+
 // Step (6): bring a domain's g up to date as coefficients.
 void pliant_solver_sum(pliant_solver *solver, int32_t domain);
-
-// Monotonic nanoseconds.
-int64_t pliant_solver_clock(void);

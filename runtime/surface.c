@@ -52,7 +52,7 @@ pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant
 {
     const pliant_model *model = solver->model;
     if (level < 0 || level > model->finest_level || !u) return PLIANT_ERR_ARGUMENT;
-    const int64_t begin = pliant_solver_clock();
+    const int64_t begin = pliant_clock_ns();
     reconstruct(solver, PLIANT_DOMAIN_FREE, level);
 
     const int32_t vertex_count = model->hierarchy->vertex_count[level];
@@ -60,16 +60,21 @@ pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant
     const pliant_model_domain *fixed_domain = &model->domains[PLIANT_DOMAIN_FIXED];
     pack(solver->fields[PLIANT_DOMAIN_FREE].g, free_domain->nodes,
          free_domain->wavelet->level_offset[level + 1], u);
-    pack(solver->fixed_displacement, fixed_domain->nodes,
-         fixed_domain->wavelet->level_offset[level + 1], u);
+    const int32_t fixed_count = fixed_domain->wavelet->level_offset[level + 1];
+    const uint32_t finest = 1u << model->finest_level;
+    if (solver->used_levels[PLIANT_DOMAIN_FIXED] & ~finest)
+        for (int32_t p = 0; p < fixed_count; p++)
+            u[fixed_domain->nodes[p]] = pliant_solver_boundary_value(solver, fixed_domain->nodes[p]);
+    else pack(solver->fixed_displacement, fixed_domain->nodes, fixed_count, u);
     // (8) at S the displacement is known: specified at free nodes, solved for at freed ones.
     for (int32_t i = 0; i < solver->solved_count; i++) {
-        const int32_t vertex = solver->solved[i].vertex;
+        const int32_t vertex = solver->solved[i].node.vertex;
         if (vertex >= vertex_count) continue;
-        u[vertex] = model->domain[vertex] == PLIANT_DOMAIN_FREE ? solver->solved[i].value
-                                                                : solver->reference[i];
+        u[vertex] = model->domain[vertex] == PLIANT_DOMAIN_FREE
+                        ? solver->solved[i].value
+                        : pliant_solver_boundary_value(solver, vertex);
     }
-    solver->report.surface_ns = pliant_solver_clock() - begin;
+    solver->report.surface_ns = pliant_clock_ns() - begin;
     return PLIANT_OK;
 }
 
@@ -78,16 +83,13 @@ pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant
 // What is known of v without the rows of `d`: everything outside that domain, and S.
 static int32_t find_known(const pliant_solver *solver, int32_t d, int32_t vertex, pliant_vec3 *v)
 {
-    const int32_t in_domain = solver->model->domain[vertex] == d;
-    const int32_t i = find_solved(solver, vertex);
-    if (i >= 0) {
-        *v = in_domain ? solver->solved[i].value : solver->reference[i];
+    if (solver->model->domain[vertex] != d) {
+        *v = pliant_solver_boundary_value(solver, vertex);
         return 1;
     }
-    if (in_domain) return 0;
-    const int32_t load = solver->load_of[vertex];
-    *v = load >= 0 ? solver->loads[load].summed : (pliant_vec3){0, 0, 0};
-    return 1;
+    const int32_t i = find_solved(solver, vertex);
+    if (i >= 0) *v = solver->solved[i].value;
+    return i >= 0;
 }
 
 static pliant_vec3 row_value(const float *row)
@@ -186,16 +188,30 @@ pliant_status pliant_solver_tractions(pliant_solver *solver, const int32_t *vert
     return PLIANT_OK;
 }
 
+// What the traction solved for at a member of S comes to; zero at freed nodes.
+static pliant_vec3 member_force(const pliant_solver *solver, int32_t i)
+{
+    const pliant_model *model = solver->model;
+    const pliant_node node = solver->solved[i].node;
+    if (model->domain[node.vertex] != PLIANT_DOMAIN_FREE) return (pliant_vec3){0, 0, 0};
+    const float area = (float)model->node_areas[node.level][node.vertex];
+    const pliant_vec3 p = solver->reference[i];
+    return (pliant_vec3){area * p.x, area * p.y, area * p.z};
+}
+
 pliant_vec3 pliant_solver_contact_force(const pliant_solver *solver)
 {
     double force[3] = {0};
     for (int32_t i = 0; i < solver->solved_count; i++) {
-        const int32_t vertex = solver->solved[i].vertex;
-        if (solver->model->domain[vertex] != PLIANT_DOMAIN_FREE) continue;
-        const double area = solver->model->areas[vertex];
-        force[0] += area * (double)solver->reference[i].x;
-        force[1] += area * (double)solver->reference[i].y;
-        force[2] += area * (double)solver->reference[i].z;
+        const pliant_vec3 f = member_force(solver, i);
+        force[0] += (double)f.x, force[1] += (double)f.y, force[2] += (double)f.z;
     }
     return (pliant_vec3){(float)force[0], (float)force[1], (float)force[2]};
+}
+
+pliant_vec3 pliant_solver_node_force(const pliant_solver *solver, pliant_node node)
+{
+    const int32_t i = find_solved(solver, node.vertex);
+    return i >= 0 && solver->solved[i].node.level == node.level ? member_force(solver, i)
+                                                                : (pliant_vec3){0, 0, 0};
 }

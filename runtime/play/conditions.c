@@ -125,11 +125,11 @@ static growth growth_for(const pliant_conditions *conditions, const pliant_condi
 
 pliant_status pliant_conditions_solve(pliant_conditions *conditions)
 {
-    pliant_status status = pliant_solver_solve(conditions->solver);
+    pliant_status status = pliant_solver_solve(conditions->solver, PLIANT_NEVER);
     while (status == PLIANT_ERR_CAPACITY) {
         status = grow(conditions, GROW_BOTH);
         if (status < 0) return status;
-        status = pliant_solver_solve(conditions->solver);
+        status = pliant_solver_solve(conditions->solver, PLIANT_NEVER);
     }
     return status;
 }

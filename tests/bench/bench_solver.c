@@ -200,7 +200,7 @@ static step_times time_steps(const pliant_model *model, int32_t s, pliant_storag
     require(pliant_solver_create(model, &def, &solver, &err), &err);
     int32_t *patches[patch_count];
     const int32_t finest = pliant_model_describe(model).level_count - 1;
-    const pliant_columns *columns = &model->greens[0][0];
+    const pliant_columns *columns = &model->greens[0][0][model->finest_level];
     step_times result = {0};
     for (int k = 0; k < patch_count; k++) {
         patches[k] = malloc((size_t)s * sizeof **patches);
@@ -222,7 +222,7 @@ static step_times time_steps(const pliant_model *model, int32_t s, pliant_storag
             require(pliant_solver_displace(solver, (pliant_node){finest, patches[k][i]},
                                            (pliant_vec3){0, 0.01f, -0.1f}),
                     NULL);
-        const pliant_status status = pliant_solver_solve(solver);
+        const pliant_status status = pliant_solver_solve(solver, PLIANT_NEVER);
         require(status, NULL);
         require(pliant_solver_surface(solver, finest, u), NULL);
         const double end = now_us();
@@ -262,17 +262,19 @@ static void time_extraction(const pliant_model *model, int32_t s, double *plan, 
         pliant_capacitance_lay_out(&arena, model, s, &capacitance);
         pliant_capacitance_scratch_lay_out(&arena, model, s, &scratch);
     }
-    pliant_capacitance_scratch_begin(model, &scratch);
+    pliant_capacitance_scratch_begin(model, PLIANT_COMPLIANCE_STORED, &scratch);
     int32_t *vertices = malloc((size_t)s * sizeof *vertices);
+    pliant_node *nodes = malloc((size_t)s * sizeof *nodes);
     double plans[101], extracts[101], agains[101];
     for (int r = 0; r < 101; r++) {
         choose_patch(model, r, s, vertices);
+        for (int32_t i = 0; i < s; i++) nodes[i] = (pliant_node){model->finest_level, vertices[i]};
         const double begin = now_us();
-        pliant_capacitance_plan(model, vertices, s, &scratch, &capacitance);
+        pliant_capacitance_plan(model, nodes, s, &scratch, &capacitance);
         const double planned = now_us();
-        pliant_capacitance_extract(model, &capacitance, &scratch, scratch.compliance);
+        pliant_capacitance_extract(model, &capacitance, &scratch, capacitance.matrix);
         const double extracted = now_us();
-        pliant_capacitance_extract(model, &capacitance, &scratch, scratch.compliance);
+        pliant_capacitance_extract(model, &capacitance, &scratch, capacitance.matrix);
         agains[r] = now_us() - extracted;
         extracts[r] = extracted - planned;
         plans[r] = planned - begin;
@@ -280,6 +282,7 @@ static void time_extraction(const pliant_model *model, int32_t s, double *plan, 
     *plan = median(plans, 101);
     *extract = median(extracts, 101);
     *again = median(agains, 101);
+    free(nodes);
     free(vertices);
     pliant_arena_release(&arena);
 }
@@ -321,7 +324,7 @@ static void time_queries(const pliant_model *model)
                     vertices[i] =
                         domain
                             ->nodes[((int64_t)i * 977 + (kind ? frame * 131 : 0)) % domain->count];
-                require(pliant_solver_solve(solver), NULL);
+                require(pliant_solver_solve(solver, PLIANT_NEVER), NULL);
                 const double begin = now_us();
                 require(pliant_solver_displacements(solver, vertices, count, u), NULL);
                 (kind ? other : same)[frame] = now_us() - begin;
@@ -367,7 +370,7 @@ static int bench(const char *path)
     if (own_path[0]) unlink(own_path);
     const pliant_model_info info = pliant_model_describe(model);
     const int32_t m = info.free_count;
-    const uint64_t nnz = model->greens[0][0].offset[m];
+    const uint64_t nnz = model->greens[0][0][model->finest_level].offset[m];
     printf("%s: %d vertices, %d free, %d levels, factor %.1f, RMS %.3g, MAX %.3g, %.1f blocks a "
            "column\n",
            path == own_path ? "synthetic sphere" : path, info.vertex_count, m, info.level_count,

@@ -38,7 +38,7 @@ static void a_model_describes_what_was_written(void **state)
     pliant_error err = {""};
     check_ok(pliant_model_open(path, &model, &err), &err);
     check_synthetic *s = check_synthetic_create(
-        &(check_synthetic_def){1, 0.05, pliant_wavelet_default(), CHECK_ALL_BLOCKS});
+        &(check_synthetic_def){1, 0.05, pliant_wavelet_default(), CHECK_ALL_BLOCKS, 0});
     const pliant_model_info info = pliant_model_describe(model);
     assert_int_equal(info.vertex_count, 42);
     assert_int_equal(info.face_count, 80);
@@ -140,7 +140,7 @@ static int use_broken(pliant_status *verified)
         (void)!pliant_solver_press(solver, (pliant_node){finest, (v + 1) % n},
                                    (pliant_vec3){0, 0, 1});
     }
-    assert_true(pliant_solver_solve(solver) >= 0);
+    assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
     assert_int_equal(pliant_solver_surface(solver, finest, u), PLIANT_OK);
     (void)!pliant_solver_tractions(solver, NULL, n, u);
     pliant_solver_destroy(solver);

@@ -26,7 +26,7 @@ static fixture set_up(int32_t levels, double eps, pliant_wavelet_def wavelet, ch
 {
     fixture f = {.finest = levels};
     pliant_error err = {""};
-    f.exact = check_synthetic_create(&(check_synthetic_def){levels, eps, wavelet, blocks});
+    f.exact = check_synthetic_create(&(check_synthetic_def){levels, eps, wavelet, blocks, 0});
     snprintf(f.path, sizeof f.path, "/tmp/pliant_test_solver_%d.h5", (int)getpid());
     check_synthetic_write(f.exact, f.path);
     check_ok(pliant_model_open(f.path, &f.model, &err), &err);
@@ -139,7 +139,7 @@ static void compare(fixture *f, const double *u, const double *p, double u_toler
 {
     pliant_vec3 *found = calloc((size_t)f->n, sizeof *found);
     assert_non_null(found);
-    assert_int_equal(pliant_solver_solve(f->solver), PLIANT_OK);
+    assert_int_equal(pliant_solver_solve(f->solver, PLIANT_NEVER), PLIANT_OK);
     assert_int_equal(pliant_solver_surface(f->solver, f->finest, found), PLIANT_OK);
     check_at_most(largest_difference(found, u, f->n) / fmax(largest(u, 3 * f->n), 1e-30),
                   u_tolerance);
@@ -258,7 +258,7 @@ static void values_at_constraints_are_exact(void **state)
     check_problem problem = check_problem_create(f.exact);
     specify_random(&f, &problem, &random, 31, 40);
     pliant_vec3 *u = calloc((size_t)f.n, sizeof *u), *p = calloc((size_t)f.n, sizeof *p);
-    assert_true(pliant_solver_solve(f.solver) >= 0);
+    assert_true(pliant_solver_solve(f.solver, PLIANT_NEVER) >= 0);
     for (int32_t level = 0; level <= f.finest; level++) {
         const int32_t count = pliant_model_level_vertex_count(f.model, level);
         assert_int_equal(pliant_solver_surface(f.solver, level, u), PLIANT_OK);
@@ -311,7 +311,7 @@ static void chosen_vertices_equal_the_whole_surface(void **state)
         specify_random(&f, &problem, &random, 31, 30);
         pliant_vec3 *whole = calloc((size_t)f.n, sizeof *whole);
         pliant_vec3 *reactions = calloc((size_t)f.n, sizeof *reactions);
-        assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
+        assert_int_equal(pliant_solver_solve(f.solver, PLIANT_NEVER), PLIANT_OK);
         assert_int_equal(pliant_solver_surface(f.solver, f.finest, whole), PLIANT_OK);
         assert_int_equal(pliant_solver_tractions(f.solver, NULL, f.n, reactions), PLIANT_OK);
         const double size = vector_size(whole, f.n), pressure = vector_size(reactions, f.n);
@@ -321,7 +321,7 @@ static void chosen_vertices_equal_the_whole_surface(void **state)
             const int32_t count = 1 + check_random_index(&random, round < 15 ? 6 : 40);
             for (int32_t i = 0; i < count; i++) vertices[i] = check_random_index(&random, f.n);
             // A level between puts another one's values into the rows.
-            assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
+            assert_int_equal(pliant_solver_solve(f.solver, PLIANT_NEVER), PLIANT_OK);
             if (round % 3 == 1)
                 assert_int_equal(pliant_solver_surface(f.solver, 1, (pliant_vec3[162]){{0}}),
                                  PLIANT_OK);
@@ -355,7 +355,7 @@ static void a_coarser_surface_is_the_partial_inverse(void **state)
     const pliant_wavelet *w = f.exact->wavelets[0];
     double *x = calloc(3 * ((size_t)w->count + 1), sizeof *x);
     pliant_vec3 *found = calloc((size_t)f.n, sizeof *found);
-    assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
+    assert_int_equal(pliant_solver_solve(f.solver, PLIANT_NEVER), PLIANT_OK);
     // Up, down and the same twice: every level starts from the same coefficients.
     const int32_t levels[] = {0, 1, 2, 3, 2, 2, 0, 3, 1};
     for (size_t k = 0; k < sizeof levels / sizeof *levels; k++) {
@@ -404,7 +404,7 @@ static void cached_types_repeat_to_the_bit_in_any_order_of_statements(void **sta
                              PLIANT_OK);
         }
         assert_int_equal(pliant_solver_constraint_count(f.solver), 4);
-        assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
+        assert_int_equal(pliant_solver_solve(f.solver, PLIANT_NEVER), PLIANT_OK);
         assert_int_equal(pliant_solver_last(f.solver).factored, k < 3);
         assert_int_equal(pliant_solver_last(f.solver).constraint_count, 4);
         if (k < 3) first[k] = calloc((size_t)f.n, sizeof **first);
@@ -420,7 +420,7 @@ static void cached_types_repeat_to_the_bit_in_any_order_of_statements(void **sta
             assert_int_equal(pliant_solver_displace(f.solver, node_of(&f, patch[k == 2 ? 0 : k][i]),
                                                     (pliant_vec3){0, 0, 0.1f}),
                              PLIANT_OK);
-        assert_int_equal(pliant_solver_solve(f.solver), PLIANT_OK);
+        assert_int_equal(pliant_solver_solve(f.solver, PLIANT_NEVER), PLIANT_OK);
         assert_int_equal(pliant_solver_last(f.solver).factored, k != 1);
     }
     for (int32_t k = 0; k < 3; k++) free(first[k]);
@@ -466,7 +466,7 @@ static void a_coherent_walk_of_100000_steps_does_not_drift(void **state)
             problem = check_problem_create(f.exact);
             pliant_solver_release_all(f.solver);
         }
-        assert_true(pliant_solver_solve(f.solver) >= 0);
+        assert_true(pliant_solver_solve(f.solver, PLIANT_NEVER) >= 0);
         if (step % 5000 != 4999) continue;
 
         pliant_solver *other = NULL;
@@ -484,7 +484,7 @@ static void a_coherent_walk_of_100000_steps_does_not_drift(void **state)
         const pliant_vec3 g = {(float)problem.gravity[0], (float)problem.gravity[1],
                                (float)problem.gravity[2]};
         assert_int_equal(pliant_solver_gravity(other, g), PLIANT_OK);
-        assert_true(pliant_solver_solve(other) >= 0);
+        assert_true(pliant_solver_solve(other, PLIANT_NEVER) >= 0);
         assert_int_equal(pliant_solver_surface(other, f.finest, fresh), PLIANT_OK);
         f.solver = kept;
         assert_int_equal(pliant_solver_surface(kept, f.finest, walked), PLIANT_OK);
@@ -523,7 +523,7 @@ half_precision_changes_no_force_and_displacements_by_less_than_its_rounding(void
             f.solver = side ? half : exact;
             pliant_solver_release_all(f.solver);
             specify_random(&f, &ignored, &random, trial % 2 ? with_displaced : 31, 5 + trial);
-            assert_true(pliant_solver_solve(f.solver) >= 0);
+            assert_true(pliant_solver_solve(f.solver, PLIANT_NEVER) >= 0);
             check_problem_destroy(&ignored);
         }
         const pliant_vec3 a = pliant_solver_contact_force(exact),

@@ -39,7 +39,7 @@ static void *run_walk(void *argument)
                                                 : pliant_solver_support(solver, node, value);
         pliant_vec3 u[vertex_limit], p[vertex_limit];
         w->failed |= status < 0 && status != PLIANT_ERR_CAPACITY;
-        w->failed |= pliant_solver_solve(solver) < 0;
+        w->failed |= pliant_solver_solve(solver, PLIANT_NEVER) < 0;
         w->failed |= pliant_solver_displacements(solver, &v, 1, u) < 0;
         w->failed |= pliant_solver_surface(solver, 2, u) < 0;
         w->failed |= pliant_solver_tractions(solver, NULL, vertex_limit, p) < 0;

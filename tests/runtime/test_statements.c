@@ -69,7 +69,7 @@ static picture take_picture(pliant_solver *solver)
 {
     static picture p;
     memset(&p, 0, sizeof p);
-    assert_true(pliant_solver_solve(solver) >= 0);
+    assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
     p.constraints = pliant_solver_constraint_count(solver);
     assert_int_equal(pliant_solver_surface(solver, 2, p.u), PLIANT_OK);
     int32_t vertices[n], count = 0;
@@ -204,7 +204,7 @@ static void capacities_are_refused_and_come_free_again(void **state)
                              PLIANT_OK);
         assert_int_equal(pliant_solver_press(solver, node(free_vertex[round + 25]), down),
                          PLIANT_ERR_CAPACITY);
-        if (round % 3 == 0) assert_true(pliant_solver_solve(solver) >= 0);
+        if (round % 3 == 0) assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
     }
     pliant_solver_destroy(solver);
 }
@@ -223,7 +223,7 @@ static void the_last_statement_about_a_vertex_holds(void **state)
     assert_int_equal(pliant_solver_displace(other, node(b), side), PLIANT_OK);
     assert_int_equal(pliant_solver_press(other, node(c), side), PLIANT_OK);
     assert_int_equal(pliant_solver_constraint_count(other), 2);
-    assert_true(pliant_solver_solve(other) >= 0);
+    assert_true(pliant_solver_solve(other, PLIANT_NEVER) >= 0);
     assert_int_equal(pliant_solver_release(other, node(free_vertex[50])),
                      PLIANT_OK);  // nothing there
     assert_int_equal(pliant_solver_displace(other, node(a), down), PLIANT_OK);
@@ -259,7 +259,7 @@ static void statements_show_only_after_the_next_solve(void **state)
     assert_int_equal(pliant_solver_displace(solver, node(asked[0]), down), PLIANT_OK);
     assert_int_equal(pliant_solver_support(solver, node(asked[1]), side), PLIANT_OK);
     assert_int_equal(pliant_solver_press(solver, node(asked[2]), side), PLIANT_OK);
-    assert_true(pliant_solver_solve(solver) >= 0);
+    assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
     assert_int_equal(pliant_solver_displacements(solver, asked, 3, u), PLIANT_OK);
     assert_int_equal(pliant_solver_tractions(solver, asked, 3, p), PLIANT_OK);
     const pliant_vec3 force = pliant_solver_contact_force(solver);
@@ -279,8 +279,9 @@ static void statements_show_only_after_the_next_solve(void **state)
 static void bad_definitions_are_refused(void **state)
 {
     (void)state;
-    const pliant_solver_def bad[] = {{0, 8, 1, 0}, {-5, 8, 1, 0}, {8, -1, 1, 0}, {8, 8, 1, 2},
-                                     {8, 8, 0, 0}, {8, 8, -1, 0}, {8, 8, INT32_MAX, 0}};
+    const pliant_solver_def bad[] = {{0, 8, 1, 0, 0},         {-5, 8, 1, 0, 0}, {8, -1, 1, 0, 0},
+                                     {8, 8, 1, 2, 0},         {8, 8, 0, 0, 0},  {8, 8, -1, 0, 0},
+                                     {8, 8, INT32_MAX, 0, 0}, {8, 8, 1, 0, 2}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         pliant_solver *solver = NULL;
         pliant_error err = {""};
@@ -292,7 +293,8 @@ static void bad_definitions_are_refused(void **state)
     pliant_solver *solver = NULL;
     assert_int_equal(pliant_solver_create(NULL, NULL, &solver, NULL), PLIANT_ERR_ARGUMENT);
     // No more than the mesh has room for: huge capacities are small ones.
-    const pliant_solver_def huge = {INT32_MAX, INT32_MAX, 1, PLIANT_STORAGE_HALF};
+    const pliant_solver_def huge = {INT32_MAX, INT32_MAX, 1, PLIANT_STORAGE_HALF,
+                                    PLIANT_COMPLIANCE_PASSIVE};
     pliant_error err = {""};
     check_ok(pliant_solver_create(models[0], &huge, &solver, &err), &err);
     pliant_solver_destroy(solver);

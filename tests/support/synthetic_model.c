@@ -203,11 +203,11 @@ static double largest_block(const double *x, int32_t rows)
 }
 
 // Transform, threshold (GF-31..33) and round one block of Xi; measure the result (GF-70, 71).
-static void compress(check_synthetic *s, int32_t block)
+static void compress(check_synthetic *s, int32_t block, const double *xi, int32_t columns,
+                     check_compressed *to)
 {
-    const int32_t rows = s->counts[row_domain(block)], columns = s->counts[column_domain(block)];
+    const int32_t rows = s->counts[row_domain(block)];
     const pliant_wavelet *w = s->wavelets[row_domain(block)];
-    struct check_compressed *to = &s->compressed[block];
     uint64_t room = (uint64_t)rows * 8 + 8;
     to->column_offset = take((size_t)columns + 1, sizeof *to->column_offset);
     to->row = take(room, sizeof *to->row);
@@ -218,7 +218,7 @@ static void compress(check_synthetic *s, int32_t block)
     uint64_t nnz = 0;
 
     for (int32_t j = 0; j < columns; j++) {
-        gather_column(s->xi[block], rows, 3 * (size_t)columns, j, exact);
+        gather_column(xi, rows, 3 * (size_t)columns, j, exact);
         memcpy(x, exact, 9 * ((size_t)rows + 1) * sizeof *x);
         pliant_wavelet_forward(w, 9, x);
         const double most = largest_block(exact, rows);
@@ -274,23 +274,41 @@ static void compress_gravity(check_synthetic *s, int32_t d)
     free(x);
 }
 
+static void round_columns(const check_synthetic *s, int32_t block, const check_compressed *from,
+                          int32_t columns, double *xi)
+{
+    const int32_t rows = s->counts[row_domain(block)];
+    const pliant_wavelet *w = s->wavelets[row_domain(block)];
+    double *x = take(9 * ((size_t)rows + 1), sizeof *x);
+    for (int32_t j = 0; j < columns; j++) {
+        memset(x, 0, 9 * ((size_t)rows + 1) * sizeof *x);
+        for (uint64_t e = from->column_offset[j]; e < from->column_offset[j + 1]; e++)
+            for (int c = 0; c < 9; c++) x[9 * (size_t)from->row[e] + c] = from->block[9 * e + c];
+        pliant_wavelet_inverse(w, w->level_count - 1, 9, x);
+        scatter_column(x, rows, 3 * (size_t)columns, j, xi);
+    }
+    free(x);
+}
+
+static int32_t level_columns(const check_synthetic *s, int32_t block, int32_t level)
+{
+    return s->wavelets[column_domain(block)]->level_offset[level + 1];
+}
+
+static int32_t is_stored(const check_synthetic *s, int32_t level)
+{
+    return s->def.level_mask == 0 ? level == s->def.levels : s->def.level_mask >> level & 1;
+}
+
 void check_synthetic_round(check_synthetic *s)
 {
     for (int32_t block = 0; block < block_count(s); block++) {
-        const int32_t rows = s->counts[row_domain(block)];
-        const int32_t columns = s->counts[column_domain(block)];
-        const pliant_wavelet *w = s->wavelets[row_domain(block)];
-        const struct check_compressed *from = &s->compressed[block];
-        double *x = take(9 * ((size_t)rows + 1), sizeof *x);
-        for (int32_t j = 0; j < columns; j++) {
-            memset(x, 0, 9 * ((size_t)rows + 1) * sizeof *x);
-            for (uint64_t e = from->column_offset[j]; e < from->column_offset[j + 1]; e++)
-                for (int c = 0; c < 9; c++)
-                    x[9 * (size_t)from->row[e] + c] = from->block[9 * e + c];
-            pliant_wavelet_inverse(w, w->level_count - 1, 9, x);
-            scatter_column(x, rows, 3 * (size_t)columns, j, s->xi[block]);
-        }
-        free(x);
+        round_columns(s, block, &s->compressed[block], s->counts[column_domain(block)],
+                      s->xi[block]);
+        for (int32_t l = 0; l < s->def.levels; l++)
+            if (s->coarse_xi[l][block])
+                round_columns(s, block, &s->coarse[l][block], level_columns(s, block, l),
+                              s->coarse_xi[l][block]);
     }
     for (int32_t d = 0; d < (s->def.blocks == CHECK_ALL_BLOCKS ? 2 : 1); d++) {
         const int32_t rows = s->counts[d];
@@ -300,6 +318,47 @@ void check_synthetic_round(check_synthetic *s)
         scatter_column(x, rows, 3, 0, s->gravity[d]);
         free(x);
     }
+}
+
+// The columns of level l from those of l + 1 (GF-60): each its own and half of every odd neighbour
+// that is in the domain.
+static void refine_columns(check_synthetic *s, int32_t block, int32_t level, const double *finer,
+                           double *xi)
+{
+    const int32_t d = column_domain(block), rows = 3 * s->counts[row_domain(block)];
+    const size_t columns = 3 * (size_t)level_columns(s, block, level);
+    const size_t finer_columns = 3 * (size_t)level_columns(s, block, level + 1);
+    const int32_t base = s->hierarchy->vertex_count[0];
+    for (int32_t i = 0; i < rows; i++) {
+        const double *from = finer + (size_t)i * finer_columns;
+        double *to = xi + (size_t)i * columns;
+        memcpy(to, from, columns * sizeof *to);
+        for (size_t m = columns / 3; m < finer_columns / 3; m++)
+            for (int side = 0; side < 2; side++) {
+                const int32_t parent = s->hierarchy->stencils[s->nodes[d][m] - base].parents[side];
+                size_t k = 0;
+                while (k < columns / 3 && s->nodes[d][k] != parent) k++;
+                for (size_t c = 0; k < columns / 3 && c < 3; c++)
+                    to[3 * k + c] += from[3 * m + c] / 2;
+            }
+    }
+}
+
+static void coarsen(check_synthetic *s, int32_t block)
+{
+    double *previous = NULL;
+    for (int32_t l = s->def.levels; l-- > 0;) {
+        const int32_t columns = level_columns(s, block, l);
+        double *xi = take(9 * (size_t)s->counts[row_domain(block)] * (size_t)columns, sizeof *xi);
+        refine_columns(s, block, l, previous ? previous : s->xi[block], xi);
+        if (previous && !s->coarse_xi[l + 1][block]) free(previous);
+        previous = xi;
+        if (is_stored(s, l)) {
+            s->coarse_xi[l][block] = xi;
+            compress(s, block, xi, columns, &s->coarse[l][block]);
+        }
+    }
+    if (previous && !s->coarse_xi[0][block]) free(previous);
 }
 
 check_synthetic *check_synthetic_create(const check_synthetic_def *def)
@@ -317,9 +376,19 @@ check_synthetic *check_synthetic_create(const check_synthetic_def *def)
                                        &def->wavelet, &s->wavelets[d], &err),
                  &err);
     eliminate(s);
-    for (int32_t block = 0; block < block_count(s); block++) compress(s, block);
+    for (int32_t block = 0; block < block_count(s); block++) {
+        compress(s, block, s->xi[block], s->counts[column_domain(block)], &s->compressed[block]);
+        if (def->level_mask & ((1u << def->levels) - 1)) coarsen(s, block);
+    }
     for (int32_t d = 0; d < (def->blocks == CHECK_ALL_BLOCKS ? 2 : 1); d++) compress_gravity(s, d);
     return s;
+}
+
+static void free_columns(check_compressed *columns)
+{
+    free(columns->column_offset);
+    free(columns->row);
+    free(columns->block);
 }
 
 void check_synthetic_destroy(check_synthetic *s)
@@ -327,9 +396,11 @@ void check_synthetic_destroy(check_synthetic *s)
     if (!s) return;
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
         free(s->xi[b]);
-        free(s->compressed[b].column_offset);
-        free(s->compressed[b].row);
-        free(s->compressed[b].block);
+        free_columns(&s->compressed[b]);
+        for (int32_t l = 0; l < s->def.levels; l++) {
+            free(s->coarse_xi[l][b]);
+            free_columns(&s->coarse[l][b]);
+        }
     }
     for (int d = 0; d < 2; d++) {
         free(s->nodes[d]);
@@ -351,9 +422,15 @@ static void put(pliant_writer *writer, const char *path, const void *data)
     check_ok(pliant_writer_write_all(writer, path, data, &err), &err);
 }
 
-static void write_level(const check_synthetic *s, pliant_writer *writer, int32_t block)
+static const check_compressed *columns_of(const check_synthetic *s, int32_t block, int32_t level)
 {
-    const struct check_compressed *from = &s->compressed[block];
+    return level == s->def.levels ? &s->compressed[block] : &s->coarse[level][block];
+}
+
+static void write_level(const check_synthetic *s, pliant_writer *writer, int32_t block,
+                        int32_t level)
+{
+    const check_compressed *from = columns_of(s, block, level);
     char path[PLIANT_PATH_LIMIT];
     pliant_error err = {""};
     const struct {
@@ -362,11 +439,11 @@ static void write_level(const check_synthetic *s, pliant_writer *writer, int32_t
     } sections[] = {
         {"column_offset", from->column_offset}, {"row", from->row}, {"block", from->block}};
     for (size_t i = 0; i < 3; i++) {
-        pliant_section_level_path((pliant_block_name)block, s->def.levels, sections[i].name, path);
+        pliant_section_level_path((pliant_block_name)block, level, sections[i].name, path);
         put(writer, path, sections[i].data);
     }
-    check_ok(pliant_writer_write_summary(writer, (pliant_block_name)block, s->def.levels,
-                                         from->summary, &err),
+    check_ok(pliant_writer_write_summary(writer, (pliant_block_name)block, level, from->summary,
+                                         &err),
              &err);
 }
 
@@ -384,15 +461,17 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
         .fixed_count = s->counts[1],
         .text_bytes = sizeof provenance - 1,
         .has_supports = s->def.blocks == CHECK_ALL_BLOCKS,
-        .level_mask = 1u << s->def.levels,
+        .level_mask = s->def.level_mask ? s->def.level_mask : 1u << s->def.levels,
     };
     for (int32_t l = 0; l < surface->level_count; l++) {
         layout.free_columns[l] = s->wavelets[0]->level_offset[l + 1];
         layout.fixed_columns[l] = s->wavelets[1]->level_offset[l + 1];
     }
     for (int32_t block = 0; block < block_count(s); block++)
-        layout.nnz[block][s->def.levels] =
-            s->compressed[block].column_offset[s->counts[column_domain(block)]];
+        for (int32_t l = 0; l <= s->def.levels; l++)
+            if (is_stored(s, l))
+                layout.nnz[block][l] =
+                    columns_of(s, block, l)->column_offset[level_columns(s, block, l)];
 
     pliant_section_def *sections = take(PLIANT_SECTION_LIMIT, sizeof *sections);
     int32_t section_count = 0;
@@ -417,7 +496,9 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
     put(writer, "/domains/fixed/level_offset", s->wavelets[1]->level_offset);
     put(writer, "/body/gravity/free", s->gravity_coefficients[0]);
     if (layout.has_supports) put(writer, "/body/gravity/fixed", s->gravity_coefficients[1]);
-    for (int32_t block = 0; block < block_count(s); block++) write_level(s, writer, block);
+    for (int32_t block = 0; block < block_count(s); block++)
+        for (int32_t l = 0; l <= s->def.levels; l++)
+            if (is_stored(s, l)) write_level(s, writer, block, l);
     check_ok(pliant_writer_write_provenance(writer, provenance, &err), &err);
     check_ok(pliant_writer_commit(writer, &err), &err);
 }
@@ -447,14 +528,25 @@ void check_synthetic_write_dense(const check_synthetic *s, const char *path)
     check_ok(pliant_writer_commit(writer, &err), &err);
 }
 
-void check_write_synthetic_model(const char *path, const char *dense_path, int32_t levels,
-                                 double eps, pliant_wavelet_def wavelet, check_blocks blocks)
+static void write_once(const char *path, const char *dense_path, check_synthetic_def def)
 {
-    check_synthetic *s = check_synthetic_create(
-        &(check_synthetic_def){.levels = levels, .eps = eps, .wavelet = wavelet, .blocks = blocks});
+    check_synthetic *s = check_synthetic_create(&def);
     check_synthetic_write(s, path);
     if (dense_path) check_synthetic_write_dense(s, dense_path);
     check_synthetic_destroy(s);
+}
+
+void check_write_synthetic_model(const char *path, const char *dense_path, int32_t levels,
+                                 double eps, pliant_wavelet_def wavelet, check_blocks blocks)
+{
+    write_once(path, dense_path, (check_synthetic_def){levels, eps, wavelet, blocks, 0});
+}
+
+void check_write_synthetic_levels(const char *path, const char *dense_path, int32_t levels,
+                                  double eps, pliant_wavelet_def wavelet, check_blocks blocks)
+{
+    write_once(path, dense_path,
+               (check_synthetic_def){levels, eps, wavelet, blocks, (2u << levels) - 1});
 }
 
 // ---- Reference answers ----
@@ -574,4 +666,19 @@ void check_synthetic_solve_dense(const check_synthetic *s, const check_problem *
     free(w);
     free(v);
     free(changed);
+}
+
+double check_synthetic_element(const check_synthetic *s, int32_t row, int r, int32_t level,
+                               int32_t column, int c)
+{
+    int32_t domain[2], position[2];
+    const int32_t vertices[2] = {row, column};
+    for (int k = 0; k < 2; k++)
+        for (int32_t d = 0; d < 2; d++)
+            for (int32_t i = 0; i < s->counts[d]; i++)
+                if (s->nodes[d][i] == vertices[k]) domain[k] = d, position[k] = i;
+    const int32_t block = 2 * domain[0] + domain[1];
+    const double *xi = level == s->def.levels ? s->xi[block] : s->coarse_xi[level][block];
+    return xi[(3 * (size_t)position[0] + r) * 3 * (size_t)level_columns(s, block, level) +
+              3 * (size_t)position[1] + c];
 }

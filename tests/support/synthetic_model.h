@@ -36,7 +36,16 @@ typedef struct check_synthetic_def {
     double eps;      // GF-31..33; 0 keeps every block
     pliant_wavelet_def wavelet;
     check_blocks blocks;
+    uint32_t level_mask;  // bit l: store the hierarchical columns of level l; 0: those of L alone
 } check_synthetic_def;
+
+// The compressed columns of one block and level; what the file holds.
+typedef struct check_compressed {
+    uint64_t *column_offset;
+    int32_t *row;
+    float *block;
+    double summary[PLIANT_SUMMARY_COUNT];
+} check_compressed;
 
 typedef struct check_synthetic {
     check_synthetic_def def;
@@ -51,13 +60,11 @@ typedef struct check_synthetic {
     // only the first with the free block only.
     double *xi[PLIANT_BLOCK_COUNT];
     double *gravity[2];  // shape [3m][3] and [3k][3]
-    // The compressed columns, by block; what the file holds.
-    struct check_compressed {
-        uint64_t *column_offset;
-        int32_t *row;
-        float *block;
-        double summary[PLIANT_SUMMARY_COUNT];
-    } compressed[PLIANT_BLOCK_COUNT];
+    check_compressed compressed[PLIANT_BLOCK_COUNT];
+    // The levels below L, refined (GF-60): the columns of hats of level l, those of the domain's
+    // nodes of level <= l; as xi, of as many columns as the level has. NULL: not stored.
+    double *coarse_xi[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
+    check_compressed coarse[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
     float *gravity_coefficients[2];  // shape [m][3][3], [k][3][3]
 } check_synthetic;
 
@@ -66,13 +73,20 @@ void check_synthetic_destroy(check_synthetic *synthetic);
 
 void check_synthetic_write(const check_synthetic *synthetic, const char *path);
 void check_synthetic_write_dense(const check_synthetic *synthetic, const char *path);
-// Create, write, destroy. `dense_path` may be NULL.
+// Create, write, destroy: the finest level's columns alone, or those of all levels. `dense_path` may
+// be NULL.
 void check_write_synthetic_model(const char *path, const char *dense_path, int32_t levels,
                                  double eps, pliant_wavelet_def wavelet, check_blocks blocks);
+void check_write_synthetic_levels(const char *path, const char *dense_path, int32_t levels,
+                                  double eps, pliant_wavelet_def wavelet, check_blocks blocks);
 
 // Replace xi and gravity by what the file's coefficients say after the inverse transform (in
 // double), so that the error of compression is out of a comparison.
 void check_synthetic_round(check_synthetic *synthetic);
+
+// Component (r, c) of the block at vertex `row` of the column of the hat of `column` on `level`.
+double check_synthetic_element(const check_synthetic *synthetic, int32_t row, int r, int32_t level,
+                               int32_t column, int c);
 
 // ---- Reference answers; need CHECK_ALL_BLOCKS ----
 

@@ -33,7 +33,8 @@
 
 typedef enum pliant_status {
     PLIANT_OK = 0,
-    PLIANT_ROUGH = 2,           // the compressed contact compliance lost definiteness: finite, unreliable
+    PLIANT_LATE = 1,   // the deadline came first: constraints are met on a coarser level
+    PLIANT_ROUGH = 2,  // the stored contact compliance is not definite: finite, unreliable
     PLIANT_ERR_ARGUMENT = -1,   // a value outside what the call accepts
     PLIANT_ERR_MEMORY = -2,     // allocation refused
     PLIANT_ERR_IO = -3,         // the system refused to open, read, map or write

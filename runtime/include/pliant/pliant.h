@@ -35,8 +35,20 @@ typedef struct pliant_model_info {
     double young, poisson, density;  // Pa, -, kg/m^3
     double rms, max, factor;  // of the free-free block: GF-70, GF-71, dense blocks / kept blocks
     int32_t has_supports;     // 1: fixed columns and rows are stored (--blocks all)
+    int32_t coarsest_constraint_level, finest_constraint_level;  // stored Green's functions
 } pliant_model_info;
 PLIANT_API pliant_model_info pliant_model_describe(const pliant_model *model);
+
+// The hierarchical Green's functions of one level (GF 7).
+typedef struct pliant_level_info {
+    int32_t vertex_count;     // |K(l)|
+    int32_t column_count;     // free nodes whose hats have columns; 0: the level is not stored
+    double rms, max, factor;  // as in pliant_model_info
+    // Smallest eigenvalue of this level's area-weighted, symmetrised contact compliance, scaled to
+    // a unit diagonal: below 0 some patch would not be definite as stored. 0: not known.
+    double smallest_eigenvalue;
+} pliant_level_info;
+PLIANT_API pliant_level_info pliant_model_level(const pliant_model *model, int32_t level);
 
 PLIANT_API int32_t pliant_model_level_vertex_count(const pliant_model *model, int32_t level);
 PLIANT_API int32_t pliant_model_level_face_count(const pliant_model *model, int32_t level);
@@ -51,15 +63,26 @@ PLIANT_API int32_t pliant_model_is_free(const pliant_model *model,
 PLIANT_API double pliant_model_area(const pliant_model *model, int32_t vertex);  // a_i, m^2 (GF-4)
 // Free vertex whose rest position is nearest to `position` (shape [3], m).
 PLIANT_API int32_t pliant_model_nearest(const pliant_model *model, const double *position);
+// The same among the vertices of a level; -1: there is none.
+PLIANT_API int32_t pliant_model_nearest_on(const pliant_model *model, int32_t level,
+                                           const double *position);
 
-// ---- Solver ----
-
-// A basis function: vertex `vertex` seen on level `level` (GF-51); on the finest level, L, the
-// vertex itself. Nodes of levels that the file has no columns for are PLIANT_ERR_MISSING; today
-// that is all but L.
+// A hierarchical basis function, the hat of vertex `vertex` on level `level` (GF-51..53); on the
+// finest level, L, the vertex itself. Constraints and loads on it act through the hat, which is one
+// at its vertex, falls to zero at the level's neighbours and ends where its domain does. Nodes of
+// levels that the file has no columns for are PLIANT_ERR_MISSING.
 typedef struct pliant_node {
     int32_t level, vertex;
 } pliant_node;
+// Integral of a node's hat over the surface, m^2: traction times this is its force. 0: no such
+// node.
+PLIANT_API double pliant_model_node_area(const pliant_model *model, pliant_node node);
+
+// ---- Solver ----
+
+// Monotonic time in nanoseconds, what deadlines are given in.
+PLIANT_API int64_t pliant_clock_ns(void);
+#define PLIANT_NEVER INT64_MAX  // no deadline
 
 // Where a solver reads the columns that it sums at every solve. Half: a copy of its own in half
 // precision, scaled by columns, 24 bytes a stored block; worth it from some 30 nodes in S on. Taken
@@ -71,11 +94,25 @@ typedef enum pliant_storage {
     PLIANT_STORAGE_HALF = 1,
 } pliant_storage;
 
+// What a contact solve takes for the compliance among the nodes of S.
+typedef enum pliant_compliance {
+    // As stored: C of GF-69 element by element. What compression did to symmetry and definiteness
+    // shows as PLIANT_ROUGH.
+    PLIANT_COMPLIANCE_STORED = 0,
+    // Symmetric and positive definite in the energy sense (weighted by the hats' areas), by
+    // construction: opposite elements are averaged, of two levels the one at the finer vertex is
+    // taken for both, and the diagonal is raised where the least eigenvalue falls short. Contact
+    // then has an elastic energy. The raise never falls until the last constraint is released, so
+    // that no loop through contact gains energy, whatever nodes come and go.
+    PLIANT_COMPLIANCE_PASSIVE = 1,
+} pliant_compliance;
+
 typedef struct pliant_solver_def {
     int32_t constraint_capacity;  // s: the capacitance matrix (GF-19) is 3s x 3s. Default 64
     int32_t load_capacity;  // nodes with a specified traction or support displacement. Default 256
     int32_t cache_count;    // boundary-value-problem types whose inverse is kept. Default 4
     pliant_storage storage;  // Default PLIANT_STORAGE_FLOAT
+    pliant_compliance compliance;  // Default PLIANT_COMPLIANCE_STORED
 } pliant_solver_def;
 PLIANT_API pliant_solver_def pliant_solver_default(const pliant_model *model);
 PLIANT_CALL pliant_status pliant_solver_create(const pliant_model *model,
@@ -84,8 +121,8 @@ PLIANT_CALL pliant_status pliant_solver_create(const pliant_model *model,
 PLIANT_API void pliant_solver_destroy(pliant_solver *solver);  // NULL is fine
 
 // Statements change the state and cost next to nothing; solve does the work, and what is read stays
-// that of the last solve until the next. The last statement about a vertex holds; their order does
-// not matter otherwise. Displace prescribes the displacement of a free vertex (its type changes:
+// that of the last solve until the next. The last statement about a vertex holds, on whatever level
+// it was made; their order does not matter otherwise. Levels may be mixed. Displace prescribes the displacement of a free vertex (its type changes:
 // CMA). Press prescribes the traction of a free vertex, or frees a fixed one and loads it. Support
 // prescribes a fixed vertex's displacement. The latter two on fixed vertices need the fixed blocks
 // (has_supports; else PLIANT_ERR_MISSING). PLIANT_ERR_ARGUMENT: no such node, a number that is not
@@ -105,12 +142,20 @@ PLIANT_API void pliant_solver_release_all(pliant_solver *solver);  // gravity to
 PLIANT_API int32_t
 pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose type is changed
 
-// Solve for the present state (GF-42..45): afterwards tractions and forces at constraints are known
-// and any part of the surface can be read. Does not refuse. PLIANT_ROUGH: the compressed
-// capacitance matrix of this patch is not positive definite; finite, displacements at S as
-// specified, but forces are unreliable (use a model with a smaller MAX). A set of nodes that no
-// kept type has costs a factorisation: about 54 s^3 operations; the report tells.
-PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver);
+// Solve for the present state (GF-42..45, 68, 69): afterwards tractions and forces at constraints
+// are known and any part of the surface can be read. Does not refuse. A set of nodes that no kept
+// type has costs an update of the nearest kept type's inverse (some 70 s^2 operations for each node
+// that came or went) or a factorisation (some 54 s^3), whichever is less; the report tells.
+//
+// `deadline` is a time of pliant_clock_ns, or PLIANT_NEVER. When the work ahead, predicted from
+// operation counts calibrated at create, would end after it, the constraints are resolved on the
+// finest level that fits (GF 8.2): a constraint on a finer level stays when its vertex belongs to
+// that level, with that level's hat; it is left out when such a hat covers its vertex; else it
+// stays as it is. Then the status is PLIANT_LATE, the state is valid, and the next solve starts
+// from the full set again. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of
+// this patch is not positive definite; finite, displacements at S as specified, but forces are
+// unreliable.
+PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline);
 
 // Displacements of the whole surface up to `level` (GF-46, 47): u[level_vertex_count], m. Exact
 // where displaced or supported, on every level. Another level after the same solve costs a new
@@ -126,18 +171,37 @@ PLIANT_CALL pliant_status pliant_solver_displacements(pliant_solver *solver,
 // (PLIANT_ERR_MISSING without fixed rows). p[count], N/m^2.
 PLIANT_CALL pliant_status pliant_solver_tractions(pliant_solver *solver, const int32_t *vertices,
                                                   int32_t count, pliant_vec3 *p);
-// Sum of a_i p_i over the displaced vertices, N: what the tool exerts on the body.
+// Sum over the displaced nodes of traction times hat area, N: what the tool exerts on the body.
 PLIANT_API pliant_vec3 pliant_solver_contact_force(const pliant_solver *solver);
+// The same of one displaced node, N; zero when it was not in S in the last solve.
+PLIANT_API pliant_vec3 pliant_solver_node_force(const pliant_solver *solver, pliant_node node);
 
 // What the last solve did and took; times are monotonic nanoseconds.
 typedef struct pliant_solver_report {
-    int32_t constraint_count;  // s
-    int32_t level;             // constraint level used
-    int32_t factored;  // 1: a new boundary-value-problem type was factored, 0: found in the cache
+    int32_t constraint_count;  // s, of what was solved
+    int32_t asked_count;       // s of what was stated
+    int32_t level;             // finest constraint level used; finest stored one without constraints
+    int32_t is_late;           // 1: resolved on a coarser level than stated
+    int32_t factored;       // 1: a new boundary-value-problem type was factored from scratch
+    int32_t updated;        // nodes that an inverse was updated for; 0 and 0: found in the cache
     int32_t summed_columns;  // columns added because they changed (GF-11)
+    double residual;         // of the inverse, |M M^-1 x - x| / |x|, when it was updated; else 0
+    double shift;            // in the scaled compliance's diagonal, whose elements are else one
+    int64_t predicted_ns;    // of the work that was chosen
+    int64_t lateness_ns;     // end of the solve less the deadline; 0 when in time
     int64_t capacitance_ns;  // assembling and factoring C
     int64_t contact_ns;      // q = E^T W^-1 g - E^T vbar, then C^-1 q
     int64_t summation_ns;    // sparse sums
     int64_t surface_ns;      // last pliant_solver_surface, whenever it was
 } pliant_solver_report;
 PLIANT_API pliant_solver_report pliant_solver_last(const pliant_solver *solver);
+
+// Compliance among free nodes of one solver, with what is displaced now held where it is (GF-15):
+// matrix, shape [3 count][3 count], row-major: component r at node i's vertex per unit force c on
+// node j's hat, m/N, at 3 i + r, 3 j + c. By the definition's rule, so symmetric positive definite
+// when that is passive. Nodes that are themselves displaced have none: PLIANT_ERR_ARGUMENT, as for
+// nodes that are not free or `count` above the definition's constraint_capacity. To be called after
+// a solve; it does not change it. A passive raise stays until a call with `count` 0, which is to say
+// that contact through these nodes has ended.
+PLIANT_CALL pliant_status pliant_solver_compliance(pliant_solver *solver, const pliant_node *nodes,
+                                                   int32_t count, double *matrix);
