@@ -536,6 +536,7 @@ pliant_status pliant_writer_write_summary(pliant_writer *writer, pliant_block_na
     } numbers[] = {
         {"eps", PLIANT_SUMMARY_EPS}, {"lifted", PLIANT_SUMMARY_LIFTED}, {"rms", PLIANT_SUMMARY_RMS},
         {"max", PLIANT_SUMMARY_MAX}, {"factor", PLIANT_SUMMARY_FACTOR},
+        {"smallest_eigenvalue", PLIANT_SUMMARY_DEFINITE},
     };
     pliant_status status = pliant_writer_write_all(writer, path, summary, err);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers && status == PLIANT_OK; i++)

@@ -26,10 +26,10 @@ static const double spool_floor = 1e-8;
 struct pliant_compression {
     const pliant_wavelet *wavelet;
     pliant_compression_def def;
-    pliant_spool *spool;      // targets only
+    pliant_spool *spool;      // NULL: none; targets have one
     double *nodal;            // [m + 1][entries][group], the caller's
     double *error;            // the same; the paper's rule only
-    pliant_spooled scratch;   // a column on its way to the spool: room for m blocks
+    pliant_spooled scratch;   // a column on its way to the spool: room for m blocks; with a spool only
     pliant_kept_set kept;
     double exact_energy;      // sum over this rank's columns of |xi_j|^2
     double error_energy;      // the same of the stored columns' errors
@@ -56,7 +56,8 @@ pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
     if (def->eps > 0) {
         c->error = calloc(rows * width, sizeof *c->error);
         if (!c->error) status = no_memory(err);
-    } else if (status == PLIANT_OK) {
+    }
+    if (folder && status == PLIANT_OK) {
         c->scratch.rows = calloc(rows, sizeof *c->scratch.rows);
         c->scratch.norms = calloc(rows, sizeof *c->scratch.norms);
         c->scratch.blocks = calloc(rows * entries, sizeof *c->scratch.blocks);
@@ -71,16 +72,24 @@ pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
     return PLIANT_OK;
 }
 
-void pliant_compression_destroy(pliant_compression *c)
+void pliant_compression_settle(pliant_compression *c)
 {
-    if (!c) return;
-    pliant_kept_set_destroy(&c->kept);
     pliant_spool_destroy(c->spool);
     free((void *)(uintptr_t)c->scratch.blocks);
     free((void *)(uintptr_t)c->scratch.norms);
     free((void *)(uintptr_t)c->scratch.rows);
     free(c->error);
     free(c->nodal);
+    c->spool = NULL;
+    c->scratch = (pliant_spooled){.count = 0};
+    c->error = c->nodal = NULL;
+}
+
+void pliant_compression_destroy(pliant_compression *c)
+{
+    if (!c) return;
+    pliant_compression_settle(c);
+    pliant_kept_set_destroy(&c->kept);
     free(c);
 }
 
@@ -180,8 +189,10 @@ pliant_status pliant_compression_add(pliant_compression *c, const int32_t *colum
     measure(c->nodal, c->wavelet->count, peak_square, energy);
     for (int32_t k = 0; k < count; k++) c->exact_energy += energy[k];
     pliant_wavelet_forward(c->wavelet, width, c->nodal);
-    return c->def.eps > 0 ? keep_by_level(c, columns, count, peak_square, err)
-                          : spool_group(c, columns, count, peak_square, energy, err);
+    pliant_status status = PLIANT_OK;
+    if (c->def.eps > 0) status = keep_by_level(c, columns, count, peak_square, err);
+    if (c->spool && status == PLIANT_OK) status = spool_group(c, columns, count, peak_square, energy, err);
+    return status;
 }
 
 pliant_status pliant_compression_decide(pliant_compression *c, MPI_Comm comm,
@@ -189,11 +200,13 @@ pliant_status pliant_compression_decide(pliant_compression *c, MPI_Comm comm,
 {
     double exact;
     MPI_Allreduce(&c->exact_energy, &exact, 1, MPI_DOUBLE, MPI_SUM, comm);
-    if (c->def.eps == 0) {
-        const pliant_threshold_targets targets = {c->def.rms, c->def.max};
+    if (c->spool) {
         int32_t sealed = pliant_spool_seal(c->spool, err), all;
         MPI_Allreduce(&sealed, &all, 1, MPI_INT32_T, MPI_MIN, comm);
-        if (all < 0) return (pliant_status)all;
+        if (all < 0) return (pliant_status)sealed;
+    }
+    if (c->def.eps == 0) {
+        const pliant_threshold_targets targets = {c->def.rms, c->def.max};
         pliant_threshold_outcome outcome;
         const pliant_status status = pliant_threshold_search(c->wavelet, c->spool, &targets, exact, comm,
                                                              &c->kept, &outcome, err);
@@ -211,12 +224,22 @@ pliant_status pliant_compression_decide(pliant_compression *c, MPI_Comm comm,
     return PLIANT_OK;
 }
 
+const pliant_spool *pliant_compression_spool(const pliant_compression *c)
+{
+    return c->spool;
+}
+
+const pliant_kept_set *pliant_compression_kept(const pliant_compression *c)
+{
+    return &c->kept;
+}
+
 int32_t pliant_compression_column_count(const pliant_compression *c)
 {
     return c->kept.column_count;
 }
 
-int32_t pliant_compression_column(pliant_compression *c, int32_t index, int32_t *column,
+int32_t pliant_compression_column(const pliant_compression *c, int32_t index, int32_t *column,
                                   const int32_t **rows, const float **blocks)
 {
     const uint64_t begin = c->kept.offset[index];

@@ -5,6 +5,9 @@
 // errors asked for. One rank holds whole columns; MPI only sums up counts and errors.
 #pragma once
 
+#include "kept_set.h"
+#include "spool.h"
+
 #include "pliant/wavelet.h"
 
 #include <mpi.h>
@@ -26,7 +29,8 @@ typedef struct pliant_compression_result {
     double rms, max;         // GF-70, GF-71, of what is stored
 } pliant_compression_result;
 
-// `wavelet` (the row domain's) is borrowed until destroy; the spool goes to `folder`.
+// `wavelet` (the row domain's) is borrowed until destroy; the spool goes to `folder`, which may be
+// NULL with the paper's threshold: no spool then.
 PLIANT_UNUSED_RESULT pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
                                                              const pliant_compression_def *def,
                                                              const char *folder,
@@ -49,8 +53,15 @@ PLIANT_UNUSED_RESULT pliant_status pliant_compression_decide(pliant_compression 
                                                              pliant_compression_result *result,
                                                              pliant_error *err);
 
-// The stored coefficients of the index-th column added here: returns their number and borrows them
-// (until the next call). *column is its position.
-int32_t pliant_compression_column(pliant_compression *compression, int32_t index, int32_t *column,
+// The exact columns added here, as floats; borrowed until settle, readable after decide. NULL: none.
+const pliant_spool *pliant_compression_spool(const pliant_compression *compression);
+// Keep the decision alone: free the work arrays and the spool.
+void pliant_compression_settle(pliant_compression *compression);
+
+// What is stored of the columns added here, in that order; borrowed.
+const pliant_kept_set *pliant_compression_kept(const pliant_compression *compression);
+// The same of the index-th column: returns their number and borrows them (until the next call).
+// *column is its position.
+int32_t pliant_compression_column(const pliant_compression *compression, int32_t index, int32_t *column,
                                   const int32_t **rows, const float **blocks);
 int32_t pliant_compression_column_count(const pliant_compression *compression);

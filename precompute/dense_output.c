@@ -11,7 +11,6 @@ struct pliant_dense_output {
     const pliant_problem *problem;
     pliant_blocks blocks;
     pliant_writer *writer;  // first rank only
-    int32_t *position;      // [n] of a vertex in its domain
     double *slab;           // one rank's columns, row-major
     size_t capacity;
 };
@@ -29,9 +28,6 @@ PetscErrorCode pliant_dense_output_create(MPI_Comm comm, const char *path,
     d->blocks = blocks;
     PetscCallMPI(MPI_Comm_rank(comm, &d->rank));
     PetscCallMPI(MPI_Comm_size(comm, &d->size));
-    PetscCall(PetscMalloc1(problem->vertex_count, &d->position));
-    for (int32_t i = 0; i < problem->free_count; i++) d->position[problem->free_nodes[i]] = i;
-    for (int32_t i = 0; i < problem->fixed_count; i++) d->position[problem->fixed_nodes[i]] = i;
 
     pliant_status status = PLIANT_OK;
     if (d->rank == 0) {
@@ -105,21 +101,16 @@ static PetscErrorCode add_rows(pliant_dense_output *d, const char *path, const i
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_dense_output_add(pliant_dense_output *d, const int32_t *vertices, int32_t count,
-                                       const double *columns, size_t ld, pliant_error *err)
+PetscErrorCode pliant_dense_output_add(pliant_dense_output *d, pliant_dense_source source, int32_t first,
+                                       int32_t count, const double *columns, size_t ld, pliant_error *err)
 {
     PetscFunctionBegin;
     const pliant_problem *p = d->problem;
-    // Which kind of column this batch holds is the same on every rank; some ranks may hold none.
-    int kind = count == 0 ? 0 : vertices[0] == p->vertex_count ? 3 : p->held[vertices[0]] ? 2 : 1, everyone;
-    PetscCallMPI(MPI_Allreduce(&kind, &everyone, 1, MPI_INT, MPI_MAX, d->comm));
-    if (everyone == 0) PetscFunctionReturn(0);
-    static const char *const free_paths[] = {NULL, "/dense/free-free", "/dense/free-fixed", "/dense/gravity-free"};
-    static const char *const fixed_paths[] = {NULL, "/dense/fixed-free", "/dense/fixed-fixed", "/dense/gravity-fixed"};
-    const int32_t first = count == 0 || everyone == 3 ? 0 : d->position[vertices[0]];
-    PetscCall(add_rows(d, free_paths[everyone], p->free_nodes, p->free_count, first, count, columns, ld, err));
+    static const char *const free_paths[] = {"/dense/free-free", "/dense/free-fixed", "/dense/gravity-free"};
+    static const char *const fixed_paths[] = {"/dense/fixed-free", "/dense/fixed-fixed", "/dense/gravity-fixed"};
+    PetscCall(add_rows(d, free_paths[source], p->free_nodes, p->free_count, first, count, columns, ld, err));
     if (d->blocks == PLIANT_BLOCKS_ALL)
-        PetscCall(add_rows(d, fixed_paths[everyone], p->fixed_nodes, p->fixed_count, first, count, columns, ld, err));
+        PetscCall(add_rows(d, fixed_paths[source], p->fixed_nodes, p->fixed_count, first, count, columns, ld, err));
     PetscFunctionReturn(0);
 }
 
@@ -142,7 +133,6 @@ PetscErrorCode pliant_dense_output_destroy(pliant_dense_output **output)
     if (!d) PetscFunctionReturn(0);
     pliant_writer_abandon(d->writer);
     PetscCall(PetscFree(d->slab));
-    PetscCall(PetscFree(d->position));
     PetscCall(PetscFree(*output));
     PetscFunctionReturn(0);
 }

@@ -11,10 +11,18 @@ typedef struct pliant_dense_output pliant_dense_output;
 PetscErrorCode pliant_dense_output_create(MPI_Comm comm, const char *path,
                                           const pliant_problem *problem, pliant_blocks blocks,
                                           pliant_dense_output **output, pliant_error *err);
-// Collective: this rank adds the solved columns of `vertices` (shape [count]; those of one domain
-// on one rank follow each other). columns has 3 count columns of 3n values, leading dimension ld.
-PetscErrorCode pliant_dense_output_add(pliant_dense_output *output, const int32_t *vertices,
-                                       int32_t count, const double *columns, size_t ld,
+// Whose columns.
+typedef enum pliant_dense_source {
+    PLIANT_DENSE_FREE,
+    PLIANT_DENSE_FIXED,
+    PLIANT_DENSE_GRAVITY,
+} pliant_dense_source;
+
+// Collective: this rank adds the solved columns of positions first .. first + count - 1 of the source
+// domain (gravity: 0, and count 1 on one rank). columns has 3 count columns of 3n values, leading
+// dimension ld.
+PetscErrorCode pliant_dense_output_add(pliant_dense_output *output, pliant_dense_source source,
+                                       int32_t first, int32_t count, const double *columns, size_t ld,
                                        pliant_error *err);
 // Collective: the file gets its name. Destroy without it leaves nothing behind.
 PetscErrorCode pliant_dense_output_commit(pliant_dense_output *output, pliant_error *err);

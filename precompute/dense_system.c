@@ -15,12 +15,12 @@ struct pliant_dense_system {
     MPI_Comm comm;
     PetscMPIInt rank, size;
     dense_kind kind;
-    int32_t n, batch;
+    int32_t n, columns, batch;
     int32_t row_begin, row_end;  // vertices
     Mat A;                       // factored in place; node: the first rank's only
-    double *B, *gravity;         // this rank's rows, leading dimension 3 (row_end - row_begin)
+    double *right_sides, *gravity;  // this rank's rows, leading dimension 3 (row_end - row_begin)
     pliant_node_memory matrix, right, solution;  // node: shared by all ranks
-    double *received, *columns;  // scalapack: as they arrive, and as whole columns
+    double *received, *whole;    // scalapack: columns as they arrive, and whole
 };
 
 static int32_t split(int64_t count, int rank, int size)
@@ -47,23 +47,23 @@ static PetscErrorCode choose_kind(MPI_Comm comm, int32_t n, dense_kind *kind)
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_dense_system_plan(MPI_Comm comm, int32_t n, int32_t batch,
+PetscErrorCode pliant_dense_system_plan(MPI_Comm comm, int32_t n, int32_t columns, int32_t batch,
                                         pliant_dense_plan *plan)
 {
     PetscFunctionBegin;
     dense_kind kind;
     PetscCall(choose_kind(comm, n, &kind));
     const double rows = 3.0 * n, matrix = rows * rows * sizeof(double);
-    const double columns = rows * 3.0 * batch * sizeof(double);
+    const double column = rows * 3 * sizeof(double);
     *plan = (pliant_dense_plan){.kind = kind == NODE ? "node" : "scalapack",
                                 // ScaLAPACK's block-cyclic copy stands beside the rows once.
                                 .matrix_bytes = kind == NODE ? matrix : 2 * matrix,
-                                .right_hand_bytes = matrix,
-                                .batch_bytes = (kind == NODE ? 2 : 6) * columns};
+                                .right_hand_bytes = column * columns,
+                                .batch_bytes = (kind == NODE ? 2 : 6) * column * batch};
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t batch,
+PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t columns, int32_t batch,
                                           pliant_dense_system **system)
 {
     PetscFunctionBegin;
@@ -71,6 +71,7 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t batc
     PetscCall(PetscNew(&s));
     s->comm = comm;
     s->n = n;
+    s->columns = columns;
     s->batch = batch;
     s->matrix.file = s->right.file = s->solution.file = -1;
     PetscCallMPI(MPI_Comm_rank(comm, &s->rank));
@@ -80,12 +81,12 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t batc
     PetscCall(choose_kind(comm, n, &s->kind));
 
     const size_t rows = 3 * (size_t)n, own_rows = 3 * (size_t)(s->row_end - s->row_begin);
-    const size_t columns = 3 * (size_t)batch;
+    const size_t at_once = 3 * (size_t)batch;
     if (s->kind == NODE) {
         int a, r, x;
         PetscCall(pliant_node_memory_create(comm, rows * rows * sizeof(double), &s->matrix, &a));
-        PetscCall(pliant_node_memory_create(comm, rows * columns * sizeof(double), &s->right, &r));
-        PetscCall(pliant_node_memory_create(comm, rows * columns * sizeof(double), &s->solution, &x));
+        PetscCall(pliant_node_memory_create(comm, rows * at_once * sizeof(double), &s->right, &r));
+        PetscCall(pliant_node_memory_create(comm, rows * at_once * sizeof(double), &s->solution, &x));
         if (!a || !r || !x) {
             // No shared memory between these ranks (a locked-down container, say): go without.
             pliant_node_memory_destroy(&s->matrix);
@@ -99,10 +100,10 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t batc
     } else {
         PetscCall(MatCreateDense(comm, (PetscInt)own_rows, (PetscInt)own_rows, (PetscInt)rows,
                                  (PetscInt)rows, NULL, &s->A));
-        PetscCall(PetscMalloc1(rows * (columns / s->size + 3), &s->received));
-        PetscCall(PetscMalloc1(rows * (columns / s->size + 3), &s->columns));
+        PetscCall(PetscMalloc1(rows * (at_once / s->size + 3), &s->received));
+        PetscCall(PetscMalloc1(rows * (at_once / s->size + 3), &s->whole));
     }
-    PetscCall(PetscCalloc1(own_rows * rows, &s->B));
+    PetscCall(PetscCalloc1(own_rows * 3 * (size_t)columns, &s->right_sides));
     PetscCall(PetscCalloc1(own_rows * 3, &s->gravity));
     *system = s;
     PetscFunctionReturn(0);
@@ -113,10 +114,10 @@ PetscErrorCode pliant_dense_system_destroy(pliant_dense_system **system)
     PetscFunctionBegin;
     pliant_dense_system *s = *system;
     if (!s) PetscFunctionReturn(0);
-    PetscCall(PetscFree(s->columns));
+    PetscCall(PetscFree(s->whole));
     PetscCall(PetscFree(s->received));
     PetscCall(PetscFree(s->gravity));
-    PetscCall(PetscFree(s->B));
+    PetscCall(PetscFree(s->right_sides));
     PetscCall(MatDestroy(&s->A));
     pliant_node_memory_destroy(&s->solution);
     pliant_node_memory_destroy(&s->right);
@@ -128,8 +129,8 @@ PetscErrorCode pliant_dense_system_destroy(pliant_dense_system **system)
 pliant_dense_rows pliant_dense_system_rows(const pliant_dense_system *s)
 {
     const size_t own_rows = 3 * (size_t)(s->row_end - s->row_begin);
-    pliant_dense_rows rows = {.row_begin = s->row_begin, .row_end = s->row_end, .B = s->B,
-                              .gravity = s->gravity, .ld_b = own_rows, .ld_g = own_rows};
+    pliant_dense_rows rows = {.row_begin = s->row_begin, .row_end = s->row_end, .right = s->right_sides,
+                              .gravity = s->gravity, .ld_right = own_rows, .ld_g = own_rows};
     if (s->kind == NODE) {
         rows.A = s->matrix.values + 3 * (size_t)s->row_begin;
         rows.ld_a = 3 * (size_t)s->n;
@@ -177,24 +178,20 @@ PetscErrorCode pliant_dense_system_factor(pliant_dense_system *s, int *singular)
     PetscFunctionReturn(0);
 }
 
-// This rank's rows of the right-hand sides of `vertices`, into `right` with leading dimension ld.
-static void gather_right(const pliant_dense_system *s, const int32_t *vertices, int32_t count,
-                         double *right, size_t ld)
+// This rank's rows of right-hand sides, into `right` with leading dimension ld.
+static void place_right(const pliant_dense_system *s, const double *source, int32_t count,
+                        double *right, size_t ld)
 {
     const size_t own_rows = 3 * (size_t)(s->row_end - s->row_begin);
-    for (int32_t j = 0; j < count; j++) {
-        const double *source =
-            vertices[j] == s->n ? s->gravity : s->B + 3 * (size_t)vertices[j] * own_rows;
-        for (int c = 0; c < 3; c++)
-            memcpy(right + (3 * (size_t)j + c) * ld, source + c * own_rows, own_rows * sizeof *right);
-    }
+    for (size_t j = 0; j < 3 * (size_t)count; j++)
+        memcpy(right + j * ld, source + j * own_rows, own_rows * sizeof *right);
 }
 
-static PetscErrorCode solve_on_node(pliant_dense_system *s, const int32_t *vertices, int32_t count)
+static PetscErrorCode solve_on_node(pliant_dense_system *s, const double *source, int32_t count)
 {
     PetscFunctionBegin;
     const size_t rows = 3 * (size_t)s->n;
-    gather_right(s, vertices, count, s->right.values + 3 * (size_t)s->row_begin, rows);
+    place_right(s, source, count, s->right.values + 3 * (size_t)s->row_begin, rows);
     PetscCall(pliant_node_wait(s->comm));
     if (s->rank == 0) {
         Mat R, X;
@@ -210,7 +207,7 @@ static PetscErrorCode solve_on_node(pliant_dense_system *s, const int32_t *verti
     PetscFunctionReturn(0);
 }
 
-static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const int32_t *vertices, int32_t count)
+static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const double *source, int32_t count)
 {
     PetscFunctionBegin;
     const PetscInt rows = 3 * s->n;
@@ -219,7 +216,7 @@ static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const int32_t *
     double *right;
     PetscCall(MatCreateDense(s->comm, (PetscInt)own_rows, PETSC_DECIDE, rows, 3 * count, NULL, &R));
     PetscCall(MatDenseGetArrayWrite(R, &right));
-    gather_right(s, vertices, count, right, own_rows);
+    place_right(s, source, count, right, own_rows);
     PetscCall(MatDenseRestoreArrayWrite(R, &right));
     PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
@@ -254,7 +251,7 @@ static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const int32_t *
     PetscCall(MatDenseRestoreArrayRead(X, &solution));
     for (int r = 0, row = 0; r < s->size; row += all_rows[r], r++)
         for (int32_t c = 0; c < 3 * own; c++)
-            memcpy(s->columns + (size_t)c * rows + row,
+            memcpy(s->whole + (size_t)c * rows + row,
                    s->received + receive_at[r] + (size_t)c * all_rows[r],
                    (size_t)all_rows[r] * sizeof(double));
     PetscCall(PetscFree(all_rows));
@@ -263,21 +260,39 @@ static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const int32_t *
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_dense_system_solve(pliant_dense_system *s, const int32_t *vertices,
-                                         int32_t count, pliant_dense_share *share)
+// Collective: `source` is this rank's rows of three right-hand sides for each of `count` columns.
+static PetscErrorCode solve(pliant_dense_system *s, const double *source, int32_t count,
+                            pliant_dense_share *share)
 {
     PetscFunctionBegin;
-    PetscCheck(count <= s->batch, s->comm, PETSC_ERR_ARG_SIZ, "batch of %d vertices, room for %d",
-               count, s->batch);
     share->begin = split(count, s->rank, s->size);
     share->end = split(count, s->rank + 1, s->size);
     share->ld = 3 * (size_t)s->n;
     if (s->kind == NODE) {
-        PetscCall(solve_on_node(s, vertices, count));
+        PetscCall(solve_on_node(s, source, count));
         share->columns = s->solution.values + 3 * (size_t)share->begin * share->ld;
     } else {
-        PetscCall(solve_by_scalapack(s, vertices, count));
-        share->columns = s->columns;
+        PetscCall(solve_by_scalapack(s, source, count));
+        share->columns = s->whole;
     }
+    PetscFunctionReturn(0);
+}
+
+PetscErrorCode pliant_dense_system_solve(pliant_dense_system *s, int32_t first, int32_t count,
+                                         pliant_dense_share *share)
+{
+    PetscFunctionBegin;
+    PetscCheck(count <= s->batch, s->comm, PETSC_ERR_ARG_SIZ, "batch of %d columns, room for %d",
+               count, s->batch);
+    PetscCheck(first >= 0 && first + count <= s->columns, s->comm, PETSC_ERR_ARG_OUTOFRANGE,
+               "columns %d to %d of %d", first, first + count - 1, s->columns);
+    PetscCall(solve(s, s->right_sides + 9 * (size_t)(s->row_end - s->row_begin) * (size_t)first, count, share));
+    PetscFunctionReturn(0);
+}
+
+PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *s, pliant_dense_share *share)
+{
+    PetscFunctionBegin;
+    PetscCall(solve(s, s->gravity, 1, share));
     PetscFunctionReturn(0);
 }

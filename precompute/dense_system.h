@@ -19,29 +19,30 @@
 
 typedef struct pliant_dense_system pliant_dense_system;
 
-// Bytes on this machine that a system of n vertices will need, all its ranks together, so that a run
-// can be refused before it starts; `batch` as in create.
+// Bytes on this machine that a system will need, all its ranks together, so that a run can be refused
+// before it starts; the numbers as in create.
 typedef struct pliant_dense_plan {
     const char *kind;        // "node" or "scalapack"
     double matrix_bytes;     // A
-    double right_hand_bytes; // B
+    double right_hand_bytes; // right-hand sides
     double batch_bytes;      // right-hand sides and solutions of one batch, with solver copies
 } pliant_dense_plan;
 
 // Collective.
-PetscErrorCode pliant_dense_system_plan(MPI_Comm comm, int32_t n, int32_t batch,
+PetscErrorCode pliant_dense_system_plan(MPI_Comm comm, int32_t n, int32_t columns, int32_t batch,
                                         pliant_dense_plan *plan);
-// Collective: memory for n vertices, zeroed; up to `batch` vertices are solved for at once.
-PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t batch,
+// Collective: memory for n vertices and `columns` right-hand sides of three, zeroed; up to `batch` of
+// them are solved for at once.
+PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t columns, int32_t batch,
                                           pliant_dense_system **system);
 PetscErrorCode pliant_dense_system_destroy(pliant_dense_system **system);  // collective
 
-// Where this rank assembles: vertices row_begin .. row_end - 1, in the arrays that
-// pliant_bem_assemble fills. Borrowed until factor (A) and destroy (the others).
+// Where this rank assembles: vertices row_begin .. row_end - 1; A and gravity are what
+// pliant_bem_assemble fills, right has 3 x columns. Borrowed until factor (A) and destroy (the others).
 typedef struct pliant_dense_rows {
     int32_t row_begin, row_end;
-    double *A, *B, *gravity;
-    size_t ld_a, ld_b, ld_g;
+    double *A, *right, *gravity;
+    size_t ld_a, ld_right, ld_g;
 } pliant_dense_rows;
 pliant_dense_rows pliant_dense_system_rows(const pliant_dense_system *system);
 
@@ -50,12 +51,13 @@ PetscErrorCode pliant_dense_system_factor(pliant_dense_system *system, int *sing
 
 // Whole columns of Xi, on the rank that goes on with them. Borrowed until the next solve.
 typedef struct pliant_dense_share {
-    int32_t begin, end;     // entries of `vertices` that are this rank's
+    int32_t begin, end;     // columns of the batch, from 0, that are this rank's
     const double *columns;  // [end - begin] times 3 columns of 3n values, leading dimension ld
     size_t ld;
 } pliant_dense_share;
 
-// Collective: solve for the columns of `vertices` (shape [count], count <= batch; the same on every
-// rank). Vertex number n stands for the three gravity columns.
-PetscErrorCode pliant_dense_system_solve(pliant_dense_system *system, const int32_t *vertices,
-                                         int32_t count, pliant_dense_share *share);
+// Collective: solve for columns first .. first + count - 1 (count <= batch).
+PetscErrorCode pliant_dense_system_solve(pliant_dense_system *system, int32_t first, int32_t count,
+                                         pliant_dense_share *share);
+// Collective: solve for the three gravity columns.
+PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *system, pliant_dense_share *share);

@@ -4,8 +4,11 @@
 // whole columns. Xi as a whole never exists.
 #include "greens.h"
 
+#include "refinement.h"
 #include "refusal.h"
+#include "right_hand.h"
 
+#include "pliant/compliance.h"
 #include "pliant/error.h"
 
 #include <math.h>
@@ -35,6 +38,31 @@ void pliant_greens_share(const pliant_greens *greens, int32_t column_count, int3
     *end = first + (int32_t)(count * (rank + 1) / size);
 }
 
+int pliant_greens_free_rows(pliant_block_name block)
+{
+    return block == PLIANT_FREE_FREE || block == PLIANT_FREE_FIXED;
+}
+
+int pliant_greens_free_columns(pliant_block_name block)
+{
+    return block == PLIANT_FREE_FREE || block == PLIANT_FIXED_FREE;
+}
+
+int32_t pliant_greens_column_count(const pliant_problem *p, pliant_block_name block, int32_t level)
+{
+    return (pliant_greens_free_columns(block) ? p->free_hats : p->fixed_hats)->level_offset[level + 1];
+}
+
+// A compressor for one level. Coarser levels are refined from its spool.
+static pliant_status create_level(pliant_greens *g, pliant_block_name block, int32_t level, pliant_error *err)
+{
+    const pliant_problem *p = g->problem;
+    const int needs_spool = g->compression.eps == 0 || level > p->levels.first;
+    return pliant_compression_create(pliant_greens_free_rows(block) ? p->free_wavelet : p->fixed_wavelet,
+                                     &g->compression, needs_spool ? g->folder : NULL,
+                                     &g->blocks[block][level], err);
+}
+
 PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
                                     const pliant_options *options, const char *folder,
                                     pliant_greens **greens, pliant_error *err)
@@ -45,14 +73,13 @@ PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem
     *greens = g;
     g->comm = comm;
     g->problem = problem;
+    g->compression = options->compression;
+    g->folder = folder;
     g->batch = pliant_greens_batch(comm);
     pliant_status status = PLIANT_OK;
-    for (int b = 0; b < PLIANT_BLOCK_COUNT && status == PLIANT_OK; b++) {
-        if (b != PLIANT_FREE_FREE && options->blocks == PLIANT_BLOCKS_FREE) continue;
-        const int free_rows = b == PLIANT_FREE_FREE || b == PLIANT_FREE_FIXED;
-        status = pliant_compression_create(free_rows ? problem->free_wavelet : problem->fixed_wavelet,
-                                           &options->compression, folder, &g->blocks[b], err);
-    }
+    for (int b = 0; b < PLIANT_BLOCK_COUNT && status == PLIANT_OK; b++)
+        if (b == PLIANT_FREE_FREE || options->blocks == PLIANT_BLOCKS_ALL)
+            status = create_level(g, (pliant_block_name)b, problem->levels.last, err);
     g->gravity_free = calloc((size_t)problem->free_count * 9 + 1, sizeof *g->gravity_free);
     g->gravity_fixed = calloc((size_t)problem->fixed_count * 9 + 1, sizeof *g->gravity_fixed);
     if (status == PLIANT_OK && (!g->gravity_free || !g->gravity_fixed))
@@ -68,7 +95,8 @@ PetscErrorCode pliant_greens_destroy(pliant_greens **greens)
     if (!g) PetscFunctionReturn(0);
     free(g->gravity_fixed);
     free(g->gravity_free);
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) pliant_compression_destroy(g->blocks[b]);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) pliant_compression_destroy(g->blocks[b][l]);
     PetscCall(PetscFree(*greens));
     PetscFunctionReturn(0);
 }
@@ -96,8 +124,9 @@ static pliant_status compress(pliant_greens *g, int fixed_columns, int32_t posit
                               const double *columns, size_t ld, pliant_error *err)
 {
     const pliant_problem *p = g->problem;
-    pliant_compression *free_rows = g->blocks[fixed_columns ? PLIANT_FREE_FIXED : PLIANT_FREE_FREE];
-    pliant_compression *fixed_rows = g->blocks[fixed_columns ? PLIANT_FIXED_FIXED : PLIANT_FIXED_FREE];
+    const int32_t level = p->levels.last;
+    pliant_compression *free_rows = g->blocks[fixed_columns ? PLIANT_FREE_FIXED : PLIANT_FREE_FREE][level];
+    pliant_compression *fixed_rows = g->blocks[fixed_columns ? PLIANT_FIXED_FIXED : PLIANT_FIXED_FREE][level];
     for (int32_t first = 0; first < count; first += group) {
         const int32_t size = count - first < group ? count - first : group;
         const double *source = columns + 3 * (size_t)first * ld;
@@ -114,15 +143,14 @@ static pliant_status compress(pliant_greens *g, int fixed_columns, int32_t posit
     return PLIANT_OK;
 }
 
-// Test solved columns against the kept rows: the backward error |A_s x - b_s| / (|A_s| |x| + |b_s|),
+// Test a solved column against the kept rows: the backward error |A_s x - b_s| / (|A_s| |x| + |b_s|),
 // with absolute values taken entry by entry, which scaling columns does not change; the largest.
-static double sample_residual(const pliant_sample_row *sample, int32_t n, const int32_t *vertices,
-                              int32_t count, const double *columns, size_t ld)
+static double sample_residual(const pliant_sample_row *sample, int32_t n, int32_t column,
+                              const double *columns, size_t ld)
 {
     double worst = 0;
-    for (int32_t j = 0; sample->vertex >= 0 && j < 3 * count; j++) {
-        const double *x = columns + (size_t)j * ld;
-        const double *b = sample->B + 3 * (3 * (size_t)vertices[j / 3] + j % 3);
+    for (size_t j = 0; sample->vertex >= 0 && j < 3; j++) {
+        const double *x = columns + j * ld, *b = sample->right + 3 * (3 * (size_t)column + j);
         for (int r = 0; r < 3; r++) {
             double residual = -b[r], size = fabs(b[r]);
             for (size_t u = 0; u < 3 * (size_t)n; u++) {
@@ -136,20 +164,20 @@ static double sample_residual(const pliant_sample_row *sample, int32_t n, const 
     return worst;
 }
 
-// Columns of one domain.
+// Columns of one domain, which are those from `before` on of the system's.
 static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system, int fixed_columns,
-                                   const pliant_sample_row *sample, pliant_dense_output *dense,
-                                   int64_t done, pliant_progress *progress, pliant_error *err)
+                                   int32_t before, const pliant_sample_row *sample,
+                                   pliant_dense_output *dense, pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
     const pliant_problem *p = g->problem;
-    const int32_t *nodes = fixed_columns ? p->fixed_nodes : p->free_nodes;
-    const int32_t node_count = fixed_columns ? p->fixed_count : p->free_count;
-    for (int32_t first = 0; first < node_count; first += g->batch) {
-        const int32_t count = node_count - first < g->batch ? node_count - first : g->batch;
+    const pliant_hats *hats = fixed_columns ? p->fixed_hats : p->free_hats;
+    const int32_t columns = hats->level_offset[p->levels.last + 1];
+    for (int32_t first = 0; first < columns; first += g->batch) {
+        const int32_t count = columns - first < g->batch ? columns - first : g->batch;
         pliant_dense_share share;
         const double begin = pliant_progress_clock();
-        PetscCall(pliant_dense_system_solve(system, nodes + first, count, &share));
+        PetscCall(pliant_dense_system_solve(system, before + first, count, &share));
         const double solved = pliant_progress_clock();
         g->solve_seconds += solved - begin;
 
@@ -157,12 +185,13 @@ static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system
         PliantCall(g->comm, compress(g, fixed_columns, position, mine, share.columns, share.ld, err), err);
         // One column of every batch is enough to notice a bad factorization.
         if (mine > 0)
-            g->residual = fmax(g->residual, sample_residual(sample, p->vertex_count, nodes + position, 1,
+            g->residual = fmax(g->residual, sample_residual(sample, p->vertex_count, before + position,
                                                             share.columns, share.ld));
         if (dense)
-            PetscCall(pliant_dense_output_add(dense, nodes + position, mine, share.columns, share.ld, err));
+            PetscCall(pliant_dense_output_add(dense, fixed_columns ? PLIANT_DENSE_FIXED : PLIANT_DENSE_FREE,
+                                              position, mine, share.columns, share.ld, err));
         g->transform_seconds += pliant_progress_clock() - solved;
-        pliant_progress_update(progress, done + first + count);
+        pliant_progress_update(progress, before + first + count);
     }
     PetscFunctionReturn(0);
 }
@@ -189,7 +218,7 @@ static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *syste
     PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
     PetscCallMPI(MPI_Comm_size(g->comm, &size));
     pliant_dense_share share;
-    PetscCall(pliant_dense_system_solve(system, &p->vertex_count, 1, &share));
+    PetscCall(pliant_dense_system_solve_gravity(system, &share));
     const int32_t most = p->free_count > p->fixed_count ? p->free_count : p->fixed_count;
     const int mine = share.end > share.begin;
     double *x;
@@ -205,7 +234,7 @@ static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *syste
     PetscCallMPI(MPI_Bcast(g->gravity_free, 9 * p->free_count, MPI_FLOAT, owner, g->comm));
     PetscCallMPI(MPI_Bcast(g->gravity_fixed, 9 * p->fixed_count, MPI_FLOAT, owner, g->comm));
     if (dense)
-        PetscCall(pliant_dense_output_add(dense, &p->vertex_count, mine, share.columns, share.ld, err));
+        PetscCall(pliant_dense_output_add(dense, PLIANT_DENSE_GRAVITY, 0, mine, share.columns, share.ld, err));
     PetscFunctionReturn(0);
 }
 
@@ -214,11 +243,13 @@ PetscErrorCode pliant_greens_solve(pliant_greens *g, pliant_dense_system *system
                                    pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
-    const int all = g->blocks[PLIANT_FIXED_FIXED] != NULL;
-    const pliant_problem *p = g->problem;
-    pliant_progress_begin(progress, "solve", p->free_count + (all ? p->fixed_count : 0));
-    PetscCall(solve_domain(g, system, 0, sample, dense, 0, progress, err));
-    if (all) PetscCall(solve_domain(g, system, 1, sample, dense, p->free_count, progress, err));
+    const int32_t level = g->problem->levels.last;
+    const int all = g->blocks[PLIANT_FIXED_FIXED][level] != NULL;
+    const int32_t free_columns = g->problem->free_hats->level_offset[level + 1];
+    pliant_progress_begin(progress, "solve",
+                          pliant_right_hand_count(g->problem, all ? PLIANT_BLOCKS_ALL : PLIANT_BLOCKS_FREE));
+    PetscCall(solve_domain(g, system, 0, 0, sample, dense, progress, err));
+    if (all) PetscCall(solve_domain(g, system, 1, free_columns, sample, dense, progress, err));
     PetscCall(solve_gravity(g, system, dense, err));
     double worst;
     PetscCallMPI(MPI_Allreduce(&g->residual, &worst, 1, MPI_DOUBLE, MPI_MAX, g->comm));
@@ -226,11 +257,60 @@ PetscErrorCode pliant_greens_solve(pliant_greens *g, pliant_dense_system *system
     PetscFunctionReturn(0);
 }
 
+// Collective, for pliant_compliance_def: rounding may differ from rank to rank when everybody sums for
+// himself, and with it the number of steps; so one does it for all.
+static void sum_over_ranks(void *context, double *values, int32_t count)
+{
+    const pliant_greens *g = context;
+    PetscMPIInt rank;
+    (void)MPI_Comm_rank(g->comm, &rank);
+    (void)MPI_Reduce(rank == 0 ? MPI_IN_PLACE : values, values, count, MPI_DOUBLE, MPI_SUM, 0, g->comm);
+    (void)MPI_Bcast(values, count, MPI_DOUBLE, 0, g->comm);
+}
+
+// Collective: the eigenvalues of the contact compliance that is stored.
+static PetscErrorCode measure_definiteness(pliant_greens *g, int32_t level, pliant_error *err)
+{
+    PetscFunctionBegin;
+    const pliant_problem *p = g->problem;
+    if (p->free_hats->level_offset[level + 1] == 0) PetscFunctionReturn(0);
+    const pliant_kept_set *kept = pliant_compression_kept(g->blocks[PLIANT_FREE_FREE][level]);
+    const uint64_t none = 0;
+    const pliant_compliance_def def = {.wavelet = p->free_wavelet,
+                                       .hats = p->free_hats,
+                                       .level = level,
+                                       .columns = {.count = kept->column_count,
+                                                   .column = kept->columns,
+                                                   .offset = kept->offset ? kept->offset : &none,
+                                                   .row = kept->rows,
+                                                   .block = kept->blocks},
+                                       .sum = sum_over_ranks,
+                                       .context = g};
+    pliant_lanczos_result found = {0};
+    PliantCall(g->comm, pliant_compliance_eigenvalues(&def, &found, err), err);
+    pliant_greens_result *result = &g->results[PLIANT_FREE_FREE][level];
+    result->smallest_eigenvalue = found.smallest;
+    result->largest_eigenvalue = found.largest;
+    PetscFunctionReturn(0);
+}
+
 PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_error *err)
 {
     PetscFunctionBegin;
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
-        if (g->blocks[b])
-            PliantCall(g->comm, pliant_compression_decide(g->blocks[b], g->comm, &g->results[b], err), err);
+    const pliant_level_range levels = g->problem->levels;
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
+        const pliant_block_name block = (pliant_block_name)b;
+        if (!g->blocks[b][levels.last]) continue;
+        for (int32_t l = levels.last; l >= levels.first; l--) {
+            pliant_compression *fine = g->blocks[b][l];
+            PliantCall(g->comm, pliant_compression_decide(fine, g->comm, &g->results[b][l].compression, err), err);
+            if (l > levels.first) {
+                PliantCall(g->comm, create_level(g, block, l - 1, err), err);
+                PetscCall(pliant_refinement_run(g, block, l - 1, err));
+            }
+            pliant_compression_settle(fine);
+            if (block == PLIANT_FREE_FREE) PetscCall(measure_definiteness(g, l, err));
+        }
+    }
     PetscFunctionReturn(0);
 }

@@ -1,4 +1,5 @@
-// greens.h: the Green's functions: columns of Xi solved batch by batch and compressed on the way.
+// greens.h: the Green's functions: columns of Xi solved batch by batch and compressed on the way,
+// and from them those of coarser levels.
 #pragma once
 
 #include "compression.h"
@@ -8,21 +9,37 @@
 
 #include "pliant/sections.h"
 
+// What is known of one level of one block, over all ranks.
+typedef struct pliant_greens_result {
+    pliant_compression_result compression;  // dense 0: not asked for
+    // Of the free-free block, of what is stored: see pliant/compliance.h. 0, 0 where not known.
+    double smallest_eigenvalue, largest_eigenvalue;
+} pliant_greens_result;
+
 typedef struct pliant_greens {
     MPI_Comm comm;
     const pliant_problem *problem;
-    int32_t batch;                                    // columns' vertices solved for at once
-    pliant_compression *blocks[PLIANT_BLOCK_COUNT];   // NULL where not asked for
-    pliant_compression_result results[PLIANT_BLOCK_COUNT];
+    pliant_compression_def compression;
+    const char *folder;  // of spools; borrowed until compress
+    int32_t batch;       // columns solved for at once
+    // By block and level; NULL where not asked for, or not yet there: coarser levels come with compress.
+    pliant_compression *blocks[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+    pliant_greens_result results[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
     float *gravity_free, *gravity_fixed;  // [m][3][3], [k][3][3]: wavelet coefficients; all ranks
     double residual;                      // largest backward error of sampled rows and columns
     double solve_seconds, transform_seconds;
 } pliant_greens;
 
-// Vertices in a batch: enough right-hand sides for the dense library, whole groups for every rank.
+// Columns in a batch: enough right-hand sides for the dense library, whole groups for every rank.
 int32_t pliant_greens_batch(MPI_Comm comm);
 
-// Collective: compressors for the blocks asked for, with spools in `folder`.
+// Is this block's row (or column) domain the free one?
+int pliant_greens_free_rows(pliant_block_name block);
+int pliant_greens_free_columns(pliant_block_name block);
+// Columns of a block's level.
+int32_t pliant_greens_column_count(const pliant_problem *problem, pliant_block_name block, int32_t level);
+
+// Collective: compressors for the blocks asked for, with spools in `folder` (borrowed until compress).
 PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
                                     const pliant_options *options, const char *folder,
                                     pliant_greens **greens, pliant_error *err);
@@ -31,17 +48,18 @@ PetscErrorCode pliant_greens_destroy(pliant_greens **greens);
 // A row of the system kept from before the factorization, against which solutions are tested.
 typedef struct pliant_sample_row {
     int32_t vertex;  // -1: this rank has none
-    double *A, *B;   // [3n][3] each: three rows, column by column
+    double *A;       // [3n][3]: three rows, column by column
+    double *right;   // [3 columns][3]: the right-hand sides' rows
 } pliant_sample_row;
 
-// Collective: solve all columns of the factored system. `dense` may be NULL.
+// Collective: solve the columns of the finest level asked for. `dense` may be NULL.
 PetscErrorCode pliant_greens_solve(pliant_greens *greens, pliant_dense_system *system,
                                    const pliant_sample_row *sample, pliant_dense_output *dense,
                                    pliant_progress *progress, pliant_error *err);
-// Collective: choose what is kept in every block.
+// Collective: choose what is kept, level by level: each coarser one refined from the next finer.
 PetscErrorCode pliant_greens_compress(pliant_greens *greens, pliant_error *err);
 
-// The batches of a domain's columns, the same on every rank and when they are written.
+// The batches of a level's columns, the same on every rank and when they are written.
 // This rank's share of the batch that begins at position `first`.
 void pliant_greens_share(const pliant_greens *greens, int32_t column_count, int32_t first, int rank,
                          int size, int32_t *begin, int32_t *end);

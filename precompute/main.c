@@ -22,13 +22,14 @@ static void print_text(const pliant_options *options, const pliant_run_summary *
 {
     printf("%s: %d vertices in %d level%s, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
            s->level_count, s->level_count == 1 ? "" : "s", s->free_count, s->fixed_count, s->file_bytes / 1e6);
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
-        const pliant_compression_result *r = &s->results[b];
-        if (r->dense == 0) continue;
-        printf("  %-12s %llu of %llu blocks kept, factor %.1f, RMS %.4f, MAX %.4f\n",
-               pliant_block_text((pliant_block_name)b), (unsigned long long)r->kept,
-               (unsigned long long)r->dense, factor(r), r->rms, r->max);
-    }
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = s->levels.first; l <= s->levels.last; l++) {
+            const pliant_compression_result *r = &s->results[b][l].compression;
+            if (r->dense == 0) continue;
+            printf("  %-12s level %d, %d columns: %llu of %llu blocks kept, factor %.1f, RMS %.4f, MAX %.4f\n",
+                   pliant_block_text((pliant_block_name)b), l, s->column_counts[b][l],
+                   (unsigned long long)r->kept, (unsigned long long)r->dense, factor(r), r->rms, r->max);
+        }
     const pliant_run_times *t = &s->times;
     printf("  seconds      read %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
            "%.2f, write %.2f, total %.2f\n",
@@ -46,6 +47,31 @@ static void print_json_text(const char *text)
     putchar('"');
 }
 
+// What is known of one level of one block, without braces.
+static void print_json_result(const pliant_greens_result *result)
+{
+    const pliant_compression_result *r = &result->compression;
+    printf("\"kept\": %llu, \"dense\": %llu, \"factor\": %.6g, \"rms\": %.6g, \"max\": %.6g",
+           (unsigned long long)r->kept, (unsigned long long)r->dense, factor(r), r->rms, r->max);
+    if (result->largest_eigenvalue != 0)
+        printf(", \"smallest_eigenvalue\": %.6g, \"largest_eigenvalue\": %.6g", result->smallest_eigenvalue,
+               result->largest_eigenvalue);
+}
+
+// A block's numbers are those of its finest stored level; all its levels follow.
+static void print_json_block(const pliant_run_summary *s, pliant_block_name block)
+{
+    printf("\"%s\": {", pliant_block_text(block));
+    print_json_result(&s->results[block][s->levels.last]);
+    printf(", \"levels\": [");
+    for (int32_t l = s->levels.first; l <= s->levels.last; l++) {
+        printf("%s{\"level\": %d, \"columns\": %d, ", l > s->levels.first ? ", " : "", l, s->column_counts[block][l]);
+        print_json_result(&s->results[block][l]);
+        printf("}");
+    }
+    printf("]}");
+}
+
 static void print_json(const pliant_options *options, const pliant_run_summary *s)
 {
     printf("{\"output\": ");
@@ -55,13 +81,10 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
            ", \"file_bytes\": %.0f, \"blocks\": {",
            s->vertex_count, s->face_count, s->level_count, s->free_count, s->fixed_count, s->component_count,
            s->ranks, s->solver, s->volume, s->residual, s->memory_bytes, s->file_bytes);
-    for (int b = 0, first = 1; b < PLIANT_BLOCK_COUNT; b++) {
-        const pliant_compression_result *r = &s->results[b];
-        if (r->dense == 0) continue;
-        printf("%s\"%s\": {\"kept\": %llu, \"dense\": %llu, \"factor\": %.6g, \"rms\": %.6g, \"max\": %.6g}",
-               first ? "" : ", ", pliant_block_text((pliant_block_name)b), (unsigned long long)r->kept,
-               (unsigned long long)r->dense, factor(r), r->rms, r->max);
-        first = 0;
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
+        if (s->results[b][s->levels.last].compression.dense == 0) continue;
+        if (b > 0) printf(", ");
+        print_json_block(s, (pliant_block_name)b);
     }
     const pliant_run_times *t = &s->times;
     printf("}, \"seconds\": {\"read\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
@@ -116,11 +139,11 @@ static int run(int argc, char **argv, int rank)
                                            &progress, &summary, &err);
     free(command_line);
     if (code != 0 && code != PLIANT_REFUSED) MPI_Abort(PETSC_COMM_WORLD, EXIT_FAILED);
-    if (rank > 0) return code ? EXIT_FAILED : EXIT_DONE;
+    if (rank > 0) return !code ? EXIT_DONE : summary.misused ? EXIT_MISUSED : EXIT_FAILED;
     if (code) {
         (void)pliant_progress_end(&progress);
         fprintf(stderr, "%s: %s\n", program, err.text);
-        return EXIT_FAILED;
+        return summary.misused ? EXIT_MISUSED : EXIT_FAILED;
     }
     if (options.reporting == PLIANT_REPORT_JSON) print_json(&options, &summary);
     else if (options.talk == PLIANT_TALK_PROGRESS) print_text(&options, &summary);

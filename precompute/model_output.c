@@ -22,22 +22,13 @@ typedef struct parcel {
     uint64_t capacity;
 } parcel;
 
-static int fixed_columns(pliant_block_name block)
-{
-    return block == PLIANT_FREE_FIXED || block == PLIANT_FIXED_FIXED;
-}
-
-static int32_t column_count(const pliant_greens *g, pliant_block_name block)
-{
-    return fixed_columns(block) ? g->problem->fixed_count : g->problem->free_count;
-}
-
 // Collective: blocks in every column, summed up to offsets, [columns + 1].
-static PetscErrorCode gather_offsets(const pliant_greens *g, pliant_block_name block, uint64_t *offset)
+static PetscErrorCode gather_offsets(const pliant_greens *g, pliant_block_name block, int32_t level,
+                                     uint64_t *offset)
 {
     PetscFunctionBegin;
-    const int32_t columns = column_count(g, block);
-    pliant_compression *c = g->blocks[block];
+    const int32_t columns = pliant_greens_column_count(g->problem, block, level);
+    const pliant_compression *c = g->blocks[block][level];
     memset(offset, 0, ((size_t)columns + 1) * sizeof *offset);
     for (int32_t i = 0; i < pliant_compression_column_count(c); i++) {
         int32_t column;
@@ -65,8 +56,8 @@ static PetscErrorCode reserve(parcel *p, uint64_t count)
     PetscFunctionReturn(0);
 }
 
-// Collective: bring one block's columns to the first rank and write them.
-static PetscErrorCode write_block(pliant_writer *writer, pliant_greens *g, pliant_block_name block,
+// Collective: bring the columns of a block's level to the first rank and write them.
+static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g, pliant_block_name block,
                                   int32_t level, const uint64_t *offset, pliant_error *err)
 {
     PetscFunctionBegin;
@@ -77,7 +68,7 @@ static PetscErrorCode write_block(pliant_writer *writer, pliant_greens *g, plian
     pliant_section_level_path(block, level, "row", row_path);
     pliant_section_level_path(block, level, "block", block_path);
 
-    const int32_t columns = column_count(g, block);
+    const int32_t columns = pliant_greens_column_count(g->problem, block, level);
     parcel p = {0};
     int32_t next = 0;  // of this rank's columns, which are in batch order
     for (int32_t first = 0; first < columns; first += g->batch) {
@@ -91,7 +82,7 @@ static PetscErrorCode write_block(pliant_writer *writer, pliant_greens *g, plian
             const float *blocks = NULL;
             if (rank == r) {
                 int32_t column;
-                (void)pliant_compression_column(g->blocks[block], next, &column, &rows, &blocks);
+                (void)pliant_compression_column(g->blocks[block][level], next, &column, &rows, &blocks);
             }
             if (rank == r && r > 0) {
                 PetscCallMPI(MPI_Send(rows, (PetscMPIInt)count, MPI_INT32_T, 0, 0, g->comm));
@@ -119,20 +110,19 @@ static PetscErrorCode write_block(pliant_writer *writer, pliant_greens *g, plian
     PetscFunctionReturn(0);
 }
 
-static void summarise(const pliant_greens *g, const pliant_options *options, pliant_block_name block,
-                      double *summary)
+static void summarise(const pliant_greens *g, pliant_block_name block, int32_t level, double *summary)
 {
-    const pliant_compression_result *result = &g->results[block];
-    const int free_rows = block == PLIANT_FREE_FREE || block == PLIANT_FREE_FIXED;
-    const pliant_wavelet_def *def = free_rows ? &g->problem->free_wavelet->def : &g->problem->fixed_wavelet->def;
-    summary[PLIANT_SUMMARY_EPS] = options->compression.eps;
+    const pliant_compression_result *result = &g->results[block][level].compression;
+    const pliant_wavelet_def *def =
+        pliant_greens_free_rows(block) ? &g->problem->free_wavelet->def : &g->problem->fixed_wavelet->def;
+    summary[PLIANT_SUMMARY_EPS] = g->compression.eps;
     summary[PLIANT_SUMMARY_WAVELET] = def->scheme;
     summary[PLIANT_SUMMARY_LIFTED] = def->lifting;
     summary[PLIANT_SUMMARY_BOUNDARY] = def->boundary;
     summary[PLIANT_SUMMARY_RMS] = result->rms;
     summary[PLIANT_SUMMARY_MAX] = result->max;
     summary[PLIANT_SUMMARY_FACTOR] = result->kept ? (double)result->dense / (double)result->kept : 0;
-    summary[PLIANT_SUMMARY_RESERVED] = 0;
+    summary[PLIANT_SUMMARY_DEFINITE] = g->results[block][level].smallest_eigenvalue;
 }
 
 // The first rank's part besides the columns.
@@ -169,9 +159,14 @@ static pliant_status write_mesh(pliant_writer *writer, const pliant_greens *g,
     return pliant_writer_write_provenance(writer, provenance, err);
 }
 
+// Offsets of every stored level's columns, NULL where there are none.
+typedef struct all_offsets {
+    uint64_t *of[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+} all_offsets;
+
 static pliant_status create(const char *path, const pliant_greens *g, const pliant_options *options,
-                            const char *provenance, uint64_t *const offsets[PLIANT_BLOCK_COUNT],
-                            pliant_writer **writer, pliant_error *err)
+                            const char *provenance, const all_offsets *offsets, pliant_writer **writer,
+                            pliant_error *err)
 {
     const pliant_problem *p = g->problem;
     const int32_t finest = p->multires->level_count - 1;
@@ -182,14 +177,15 @@ static pliant_status create(const char *path, const pliant_greens *g, const plia
                                   .free_count = p->free_count,
                                   .fixed_count = p->fixed_count,
                                   .text_bytes = strlen(provenance),
-                                  .has_supports = options->blocks == PLIANT_BLOCKS_ALL,
-                                  .level_mask = 1u << finest};
+                                  .has_supports = options->blocks == PLIANT_BLOCKS_ALL};
     for (int32_t l = 0; l <= finest; l++) {
-        layout.free_columns[l] = p->free_wavelet->level_offset[l + 1];
-        layout.fixed_columns[l] = p->fixed_wavelet->level_offset[l + 1];
+        layout.free_columns[l] = p->free_hats->level_offset[l + 1];
+        layout.fixed_columns[l] = p->fixed_hats->level_offset[l + 1];
+        if (l >= p->levels.first && l <= p->levels.last) layout.level_mask |= 1u << l;
+        for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+            if (offsets->of[b][l])
+                layout.nnz[b][l] = offsets->of[b][l][pliant_greens_column_count(p, (pliant_block_name)b, l)];
     }
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
-        if (offsets[b]) layout.nnz[b][finest] = offsets[b][column_count(g, (pliant_block_name)b)];
     pliant_section_def sections[PLIANT_SECTION_LIMIT];
     int32_t section_count;
     const pliant_status status = pliant_model_layout_sections(&layout, sections, &section_count, err);
@@ -197,54 +193,75 @@ static pliant_status create(const char *path, const pliant_greens *g, const plia
     return pliant_writer_create(path, sections, section_count, writer, err);
 }
 
+// Collective: everything of one block's level.
+static PetscErrorCode write_level(pliant_writer *writer, pliant_greens *g, pliant_block_name block,
+                                  int32_t level, const uint64_t *offset, pliant_error *err)
+{
+    PetscFunctionBegin;
+    PetscMPIInt rank;
+    PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
+    PetscCall(write_columns(writer, g, block, level, offset, err));
+    pliant_status status = PLIANT_OK;
+    if (rank == 0) {
+        char offset_path[PLIANT_PATH_LIMIT];
+        double summary[PLIANT_SUMMARY_COUNT];
+        pliant_section_level_path(block, level, "column_offset", offset_path);
+        summarise(g, block, level, summary);
+        status = pliant_writer_write_all(writer, offset_path, offset, err);
+        if (status == PLIANT_OK) status = pliant_writer_write_summary(writer, block, level, summary, err);
+    }
+    PliantCall(g->comm, status, err);
+    PetscFunctionReturn(0);
+}
+
+// Collective.
+static PetscErrorCode write_model(const char *path, pliant_greens *g, const pliant_options *options,
+                                  const char *provenance, all_offsets *offsets, pliant_writer **writer,
+                                  double *bytes, pliant_error *err)
+{
+    PetscFunctionBegin;
+    PetscMPIInt rank;
+    PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
+    const pliant_level_range levels = g->problem->levels;
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = levels.first; l <= levels.last; l++) {
+            const pliant_block_name block = (pliant_block_name)b;
+            if (!g->blocks[b][l]) continue;
+            const size_t columns = (size_t)pliant_greens_column_count(g->problem, block, l);
+            PetscCall(PetscMalloc1(columns + 1, &offsets->of[b][l]));
+            PetscCall(gather_offsets(g, block, l, offsets->of[b][l]));
+        }
+    pliant_status status = PLIANT_OK;
+    if (rank == 0) {
+        status = create(path, g, options, provenance, offsets, writer, err);
+        if (status == PLIANT_OK) status = write_mesh(*writer, g, options, provenance, err);
+    }
+    PliantCall(g->comm, status, err);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = levels.first; l <= levels.last; l++)
+            if (offsets->of[b][l])
+                PetscCall(write_level(*writer, g, (pliant_block_name)b, l, offsets->of[b][l], err));
+    if (rank == 0) {
+        status = pliant_writer_commit(*writer, err);
+        *writer = NULL;
+        struct stat file;
+        *bytes = status == PLIANT_OK && stat(path, &file) == 0 ? (double)file.st_size : 0;
+    }
+    PliantCall(g->comm, status, err);
+    PetscFunctionReturn(0);
+}
+
 PetscErrorCode pliant_model_output_write(const char *path, pliant_greens *g,
                                          const pliant_options *options, const char *provenance,
                                          double *bytes, pliant_error *err)
 {
     PetscFunctionBegin;
-    PetscMPIInt rank;
-    PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
-    const int32_t finest = g->problem->multires->level_count - 1;
-    uint64_t *offsets[PLIANT_BLOCK_COUNT] = {NULL};
+    all_offsets offsets = {0};
     pliant_writer *writer = NULL;
-    PetscErrorCode code = 0;
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
-        if (!g->blocks[b]) continue;
-        PetscCall(PetscMalloc1((size_t)column_count(g, (pliant_block_name)b) + 1, &offsets[b]));
-        PetscCall(gather_offsets(g, (pliant_block_name)b, offsets[b]));
-    }
-    pliant_status status = PLIANT_OK;
-    if (rank == 0) {
-        status = create(path, g, options, provenance, offsets, &writer, err);
-        if (status == PLIANT_OK) status = write_mesh(writer, g, options, provenance, err);
-    }
-    code = pliant_refusal_agree(g->comm, status, err);
-    for (int b = 0; b < PLIANT_BLOCK_COUNT && code == 0; b++) {
-        if (!offsets[b]) continue;
-        const pliant_block_name block = (pliant_block_name)b;
-        code = write_block(writer, g, block, finest, offsets[b], err);
-        if (code) break;
-        if (rank == 0) {
-            char offset_path[PLIANT_PATH_LIMIT];
-            double summary[PLIANT_SUMMARY_COUNT];
-            pliant_section_level_path(block, finest, "column_offset", offset_path);
-            summarise(g, options, block, summary);
-            status = pliant_writer_write_all(writer, offset_path, offsets[b], err);
-            if (status == PLIANT_OK) status = pliant_writer_write_summary(writer, block, finest, summary, err);
-        }
-        code = pliant_refusal_agree(g->comm, status, err);
-    }
-    if (code == 0) {
-        if (rank == 0) {
-            status = pliant_writer_commit(writer, err);
-            writer = NULL;
-            struct stat file;
-            *bytes = status == PLIANT_OK && stat(path, &file) == 0 ? (double)file.st_size : 0;
-        }
-        code = pliant_refusal_agree(g->comm, status, err);
-    }
+    const PetscErrorCode code = write_model(path, g, options, provenance, &offsets, &writer, bytes, err);
     pliant_writer_abandon(writer);
-    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) PetscCall(PetscFree(offsets[b]));
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) PetscCall(PetscFree(offsets.of[b][l]));
     PetscCall(code);
     PetscFunctionReturn(0);
 }

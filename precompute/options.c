@@ -46,10 +46,17 @@ static const char help[] =
     "  --no-lift               without the lifting update\n"
     "  --boundary RULE         stencil nodes beyond the free surface count as zero or are dropped:\n"
     "                          zero or drop (default zero)\n"
+    "Columns\n"
+    "  --constraint-levels A..B  the hierarchical Green's functions to store, of levels A to B (A alone: one\n"
+    "                          level; default: all). Those of level B are solved for, coarser ones come\n"
+    "                          from them by refinement. Rows keep full resolution; with B under the\n"
+    "                          finest level, memory for right-hand sides and time for solving shrink\n"
+    "                          fourfold a level. The file plays with constraints on these levels.\n"
+    "  --blocks free|all       free-free block only (default), or supports and reactions too\n"
     "Output\n"
     "  -o, --output MODEL.h5   the model; written whole or not at all\n"
-    "  --blocks free|all       free-free block only (default), or supports and reactions too\n"
-    "  --dense FILE.h5         also store the exact dense columns (small models, for comparisons)\n"
+    "  --dense FILE.h5         also store the exact dense columns of the finest level (small models, for\n"
+    "                          comparisons)\n"
     "  --force                 replace existing outputs\n"
     "  -q, --quiet             print errors only (and the summary with --json)\n"
     "  --json                  print the summary as one JSON object\n"
@@ -80,6 +87,7 @@ enum {
     OPTION_WAVELET,
     OPTION_NO_LIFT,
     OPTION_BOUNDARY,
+    OPTION_CONSTRAINT_LEVELS,
     OPTION_BLOCKS,
     OPTION_DENSE,
     OPTION_FORCE,
@@ -103,6 +111,7 @@ static const struct option long_options[] = {
     {"no-lift", no_argument, NULL, OPTION_NO_LIFT},
     {"boundary", required_argument, NULL, OPTION_BOUNDARY},
     {"output", required_argument, NULL, 'o'},
+    {"constraint-levels", required_argument, NULL, OPTION_CONSTRAINT_LEVELS},
     {"blocks", required_argument, NULL, OPTION_BLOCKS},
     {"dense", required_argument, NULL, OPTION_DENSE},
     {"force", no_argument, NULL, OPTION_FORCE},
@@ -130,6 +139,30 @@ static pliant_status number(const char *option, const char *text, double low, do
                             "%s: expected a number over %g and under %g, found %s", option, low, high, text);
 }
 
+// A level's digits, or NULL: the rest of the text.
+static const char *level_digits(const char *text, int32_t *level)
+{
+    const char *end = text;
+    for (*level = 0; *end >= '0' && *end <= '9'; end++) {
+        *level = 10 * *level + (*end - '0');
+        if (*level > PLIANT_LEVEL_LIMIT) return NULL;
+    }
+    return end == text ? NULL : end;
+}
+
+// "A..B" or "A".
+static pliant_status level_range(const char *option, const char *text, pliant_level_range *range,
+                                 pliant_error *err)
+{
+    const char *end = level_digits(text, &range->first);
+    range->last = range->first;
+    if (end && strncmp(end, "..", 2) == 0) end = level_digits(end + 2, &range->last);
+    if (end && !*end && range->first <= range->last) return PLIANT_OK;
+    return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                            "%s: expected A..B, levels from 0 to %d with A at most B, or A, found '%.60s'",
+                            option, PLIANT_LEVEL_LIMIT, text);
+}
+
 // One of `count` words; *choice is its index.
 static pliant_status word(const char *option, const char *text, const char *const *words, int count,
                           int *choice, pliant_error *err)
@@ -153,7 +186,8 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     pliant_options o = {.subdivide = -1,
                         .scheme = PLIANT_SUBDIVIDE_LOOP,
                         .material = {.young = 1, .poisson = 0.3, .density = 1},
-                        .wavelet = pliant_wavelet_default()};
+                        .wavelet = pliant_wavelet_default(),
+                        .constraint_levels = {-1, -1}};
     static const char *const schemes[] = {"loop", "butterfly", "midpoint"};
     static const char *const wavelets[] = {"linear", "butterfly"};
     static const char *const boundaries[] = {"zero", "drop"};
@@ -195,6 +229,9 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             o.wavelet.boundary = (pliant_wavelet_boundary)choice;
             break;
         case OPTION_NO_LIFT: o.wavelet.lifting = PLIANT_UNLIFTED; break;
+        case OPTION_CONSTRAINT_LEVELS:
+            status = level_range("--constraint-levels", optarg, &o.constraint_levels, err);
+            break;
         case OPTION_BLOCKS:
             status = word("--blocks", optarg, blocks, 2, &choice, err);
             o.blocks = (pliant_blocks)choice;

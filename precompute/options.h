@@ -26,6 +26,11 @@ typedef enum pliant_existing {
     PLIANT_REPLACE_EXISTING,  // --force
 } pliant_existing;
 
+// Levels of hierarchical Green's functions to solve for and store.
+typedef struct pliant_level_range {
+    int32_t first, last;  // -1: from level 0, to the finest
+} pliant_level_range;
+
 typedef struct pliant_options {
     const char *mesh, *output, *dense;  // dense NULL: none
     int32_t subdivide;                  // -1: detect the levels of the mesh
@@ -34,6 +39,7 @@ typedef struct pliant_options {
     pliant_material material;
     pliant_wavelet_def wavelet;
     pliant_compression_def compression;
+    pliant_level_range constraint_levels;
     pliant_blocks blocks;
     pliant_reporting reporting;
     pliant_talk talk;

@@ -164,8 +164,12 @@ static pliant_status derive(pliant_problem *p, const pliant_options *options, pl
     if (status < 0) return status;
     pliant_wavelet_def fixed = options->wavelet;
     fixed.boundary = PLIANT_DROP;
-    return pliant_wavelet_create(p->hierarchy, p->areas, p->fixed_nodes, p->fixed_count, &fixed,
-                                 &p->fixed_wavelet, err);
+    status = pliant_wavelet_create(p->hierarchy, p->areas, p->fixed_nodes, p->fixed_count, &fixed,
+                                   &p->fixed_wavelet, err);
+    if (status < 0) return status;
+    status = pliant_hats_create(p->free_wavelet, p->free_nodes, p->areas, &p->free_hats, err);
+    if (status < 0) return status;
+    return pliant_hats_create(p->fixed_wavelet, p->fixed_nodes, p->areas, &p->fixed_hats, err);
 }
 
 PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *options,
@@ -184,6 +188,8 @@ PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *option
     PliantCall(comm, status, err);
     PetscCall(share(comm, rank, &p->multires, &p->held, &report, err));
     p->component_count = report.component_count;
+    p->levels = options->constraint_levels;
+    if (p->levels.first < 0) p->levels = (pliant_level_range){0, p->multires->level_count - 1};
     PliantCall(comm, derive(p, options, err), err);
     p->volume = pliant_mesh_volume(p->multires->mesh);
     PetscFunctionReturn(0);
@@ -194,6 +200,8 @@ PetscErrorCode pliant_problem_destroy(pliant_problem **problem)
     PetscFunctionBegin;
     pliant_problem *p = *problem;
     if (!p) PetscFunctionReturn(0);
+    pliant_hats_destroy(p->fixed_hats);
+    pliant_hats_destroy(p->free_hats);
     pliant_wavelet_destroy(p->fixed_wavelet);
     pliant_wavelet_destroy(p->free_wavelet);
     pliant_hierarchy_destroy(p->hierarchy);

@@ -4,6 +4,8 @@
 #include "options.h"
 #include "progress.h"
 
+#include "pliant/hats.h"
+
 #include <petscsys.h>
 
 typedef struct pliant_problem {
@@ -17,6 +19,8 @@ typedef struct pliant_problem {
     // Transforms of the rows: displacements vanish where the solid is held, so their stencils may
     // read zeros there; tractions of the held part do not vanish beyond it, so theirs drop nodes.
     pliant_wavelet *free_wavelet, *fixed_wavelet;
+    pliant_hats *free_hats, *fixed_hats;  // their hierarchical basis functions
+    pliant_level_range levels;  // columns asked for: first to last, of levels 0 to L
     double volume;
     int32_t component_count;
     uint64_t mesh_hash;        // FNV-1a over vertices and faces, of the finest level

@@ -4,6 +4,7 @@
 #include "model_output.h"
 #include "node_memory.h"
 #include "refusal.h"
+#include "right_hand.h"
 
 #include "pliant/error.h"
 
@@ -58,6 +59,21 @@ static void spool_folder(const char *output, char *folder, size_t size)
     else folder_of(output, folder, size);
 }
 
+// The levels of columns asked for, against those of the mesh.
+static pliant_status check_levels(const pliant_problem *p, const pliant_options *options, pliant_error *err)
+{
+    const int32_t finest = p->multires->level_count - 1;
+    if (p->levels.last > finest)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--constraint-levels: expected levels of %s, 0 to %d, found %d",
+                                options->mesh, finest, p->levels.last);
+    if (options->dense && p->levels.last < finest)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--dense stores columns of the finest level, %d: expected --constraint-levels "
+                                "up to it, found up to %d",
+                                finest, p->levels.last);
+    return PLIANT_OK;
+}
+
 // Collective: state what the run will take, and refuse what cannot fit.
 static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const pliant_options *options,
                                   const char *folder, pliant_progress *progress,
@@ -68,25 +84,35 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
     PetscCallMPI(MPI_Comm_size(comm, &size));
     PetscCall(pliant_node_size(comm, &node_size));
 
+    const pliant_level_range levels = p->levels;
+    const int32_t solved = pliant_right_hand_count(p, options->blocks);
     pliant_dense_plan plan;
-    PetscCall(pliant_dense_system_plan(comm, p->vertex_count, pliant_greens_batch(comm), &plan));
+    PetscCall(pliant_dense_system_plan(comm, p->vertex_count, solved, pliant_greens_batch(comm), &plan));
     summary->solver = plan.kind;
     const int all = options->blocks == PLIANT_BLOCKS_ALL;
-    const double rows = all ? p->vertex_count : p->free_count, columns = rows;
-    // Five groups of interleaved columns for each rank and block, in doubles.
+    const double rows = all ? p->vertex_count : p->free_count;
+    double stored = 0;  // columns of all levels
+    for (int32_t l = levels.first; l <= levels.last; l++)
+        stored += p->free_hats->level_offset[l + 1] + (all ? p->fixed_hats->level_offset[l + 1] : 0);
+    // Five groups of interleaved columns for each rank and block, in doubles; one block's coarser
+    // levels have theirs beside those of the finest.
     const double work = 5.0 * rows * 9 * PLIANT_COLUMN_GROUP * sizeof(double) * (all ? 2 : 1) * size;
     // What is kept, at the smallest compression seen in practice (GF 10.2: 8 at eps 0.01).
-    const double kept = rows * columns * 40 / 6;
+    const double kept = rows * stored * 40 / 6;
     const double needed = plan.matrix_bytes + plan.right_hand_bytes + plan.batch_bytes + work + kept;
     summary->memory_bytes = needed;
     const double here = needed * node_size / size, available = pliant_node_available();
-    const double spool = options->compression.eps > 0 ? 0 : rows * columns * 44 * node_size / size;
+    const int is_spooled = options->compression.eps == 0 || levels.first < levels.last;
+    const double spool = is_spooled ? rows * stored * 44 * node_size / size : 0;
 
     pliant_progress_note(progress,
                          "%d vertices in %d level%s, %d free and %d held; dense system of %d unknowns on "
                          "%d rank%s (%s)",
                          p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
                          p->free_count, p->fixed_count, 3 * p->vertex_count, size, size == 1 ? "" : "s", plan.kind);
+    if (levels.last < p->multires->level_count - 1)
+        pliant_progress_note(progress, "columns of level%s %d to %d: %d solved for instead of %d",
+                             levels.first < levels.last ? "s" : "", levels.first, levels.last, solved, (int)rows);
     pliant_progress_note(progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available; "
                          "temporary columns up to %.3g GB in %s",
                          needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9,
@@ -121,29 +147,35 @@ static PetscErrorCode assemble(MPI_Comm comm, const pliant_problem *p, const pli
 {
     PetscFunctionBegin;
     const pliant_dense_rows rows = pliant_dense_system_rows(system);
+    const int32_t columns = pliant_right_hand_count(p, options->blocks);
+    const size_t unknowns = 3 * (size_t)p->vertex_count, ld = 3 * (size_t)assembly_step;
+    double *B;
+    PetscCall(PetscMalloc1(ld * unknowns, &B));
     pliant_bem *bem = NULL;
     pliant_status status = pliant_bem_create(p->multires->mesh, &options->material, &bem, err);
     pliant_progress_begin(progress, "assemble", rows.row_end - rows.row_begin);
     for (int32_t v = rows.row_begin; v < rows.row_end && status == PLIANT_OK; v += assembly_step) {
         const int32_t end = rows.row_end - v < assembly_step ? rows.row_end : v + assembly_step;
         const size_t at = 3 * (size_t)(v - rows.row_begin);
-        status = pliant_bem_assemble(bem, v, end, p->held, rows.A + at, rows.ld_a, rows.B + at, rows.ld_b,
-                                     rows.gravity + at, rows.ld_g, err);
+        status = pliant_bem_assemble(bem, v, end, p->held, rows.A + at, rows.ld_a, B, ld, rows.gravity + at,
+                                     rows.ld_g, err);
+        pliant_right_hand_contract(p, options->blocks, 3 * (end - v), B, ld, rows.right + at, rows.ld_right);
         pliant_progress_update(progress, end - rows.row_begin);
     }
     pliant_bem_destroy(bem);
+    PetscCall(PetscFree(B));
     PliantCall(comm, status, err);
 
     // Keep one vertex's rows, against which the solutions will be tested.
     sample->vertex = rows.row_begin < rows.row_end ? (rows.row_begin + rows.row_end) / 2 : -1;
-    const size_t unknowns = 3 * (size_t)p->vertex_count;
     PetscCall(PetscMalloc1(3 * unknowns, &sample->A));
-    PetscCall(PetscMalloc1(3 * unknowns, &sample->B));
+    PetscCall(PetscMalloc1(9 * (size_t)columns, &sample->right));
+    if (sample->vertex < 0) PetscFunctionReturn(0);
     const size_t at = 3 * (size_t)(sample->vertex - rows.row_begin);
-    for (size_t u = 0; sample->vertex >= 0 && u < unknowns; u++) {
+    for (size_t u = 0; u < unknowns; u++)
         memcpy(sample->A + 3 * u, rows.A + u * rows.ld_a + at, 3 * sizeof(double));
-        memcpy(sample->B + 3 * u, rows.B + u * rows.ld_b + at, 3 * sizeof(double));
-    }
+    for (size_t j = 0; j < 3 * (size_t)columns; j++)
+        memcpy(sample->right + 3 * j, rows.right + j * rows.ld_right + at, 3 * sizeof(double));
     PetscFunctionReturn(0);
 }
 
@@ -167,6 +199,7 @@ static void write_provenance(const pliant_run_summary *s, const pliant_problem *
              "method = bem\n"
              "ranks = %d\n"
              "solver = %s\n"
+             "constraint_levels = %d..%d\n"
              "asked_eps = %.9g\n"
              "asked_rms = %.9g\n"
              "asked_max = %.9g\n"
@@ -179,7 +212,7 @@ static void write_provenance(const pliant_run_summary *s, const pliant_problem *
              "seconds_compress = %.3f\n",
              PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh,
              (unsigned long long)p->mesh_hash, comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc,
-             major, minor, release, s->ranks, s->solver, options->compression.eps,
+             major, minor, release, s->ranks, s->solver, s->levels.first, s->levels.last, options->compression.eps,
              options->compression.rms, options->compression.max, s->residual, s->times.read,
              s->times.assemble, s->times.factor, s->times.solve, s->times.transform, s->times.compress);
 }
@@ -218,20 +251,27 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     s->fixed_count = p->fixed_count;
     s->component_count = p->component_count;
     s->volume = p->volume;
+    s->levels = p->levels;
+    status = check_levels(p, options, err);
+    s->misused = status < 0;
+    PliantCall(comm, status, err);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = p->levels.first; l <= p->levels.last; l++)
+            s->column_counts[b][l] = pliant_greens_column_count(p, (pliant_block_name)b, l);
 
     char folder[4096];
     spool_folder(options->output, folder, sizeof folder);
     PetscCall(plan_memory(comm, p, options, folder, progress, s, err));
-    PetscCall(pliant_dense_system_create(comm, p->vertex_count, pliant_greens_batch(comm), &h->system));
+    const int32_t solved = pliant_right_hand_count(p, options->blocks);
+    PetscCall(pliant_dense_system_create(comm, p->vertex_count, solved, pliant_greens_batch(comm), &h->system));
     PetscCall(assemble(comm, p, options, h->system, &h->sample, progress, err));
     PetscCallMPI(MPI_Barrier(comm));
     s->times.assemble = pliant_progress_end(progress);
 
     const double unknowns = 3.0 * p->vertex_count, factor_flops = 2 * unknowns * unknowns * unknowns / 3;
-    const double columns = 3.0 * (options->blocks == PLIANT_BLOCKS_ALL ? p->vertex_count : p->free_count);
     if (factor_flops > long_factor_flops)
         pliant_progress_note(progress, "factor: %.1f TFLOP in one piece; the solves will take %.1f times that",
-                             factor_flops / 1e12, 2 * unknowns * unknowns * columns / factor_flops);
+                             factor_flops / 1e12, 2 * unknowns * unknowns * 3 * solved / factor_flops);
     pliant_progress_begin(progress, "factor", 0);
     int singular;
     PetscCall(pliant_dense_system_factor(h->system, &singular));
@@ -287,7 +327,7 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     const PetscErrorCode code = work(comm, options, command_line, progress, summary, &h, err);
     PetscCall(pliant_dense_output_destroy(&h.dense));
     PetscCall(pliant_greens_destroy(&h.greens));
-    PetscCall(PetscFree(h.sample.B));
+    PetscCall(PetscFree(h.sample.right));
     PetscCall(PetscFree(h.sample.A));
     PetscCall(pliant_dense_system_destroy(&h.system));
     PetscCall(pliant_problem_destroy(&h.problem));

@@ -12,7 +12,10 @@ typedef struct pliant_run_summary {
     int32_t vertex_count, face_count, level_count, free_count, fixed_count, component_count, ranks;
     const char *solver;            // "node" or "scalapack"
     double volume, residual, memory_bytes, file_bytes;
-    pliant_compression_result results[PLIANT_BLOCK_COUNT];  // kept 0 where a block was not asked for
+    pliant_level_range levels;  // stored
+    int32_t column_counts[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+    pliant_greens_result results[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+    int misused;  // 1: what was refused is the command line, seen beside its mesh
     pliant_run_times times;
 } pliant_run_summary;
 

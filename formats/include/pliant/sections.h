@@ -115,7 +115,7 @@ typedef enum pliant_summary_item {
     PLIANT_SUMMARY_RMS,       // GF-70
     PLIANT_SUMMARY_MAX,       // GF-71
     PLIANT_SUMMARY_FACTOR,    // dense blocks / kept blocks
-    PLIANT_SUMMARY_RESERVED,  // 0
+    PLIANT_SUMMARY_DEFINITE,  // smallest eigenvalue of the contact compliance; 0: not known
     PLIANT_SUMMARY_COUNT
 } pliant_summary_item;
 
@@ -144,7 +144,7 @@ typedef struct pliant_model_layout {
     int32_t fixed_count;   // k
     uint64_t text_bytes;   // provenance; a shorter text is filled up with line breaks
     int32_t has_supports;  // 1: store the fixed blocks too (--blocks all)
-    uint32_t level_mask;   // bit l set: store the columns of level l (1u << L in version 1)
+    uint32_t level_mask;   // bit l set: store the columns of level l
     // Columns of a level's set: nodes of the domain with level <= l, level_offset[l + 1].
     int32_t free_columns[PLIANT_LEVEL_LIMIT + 1], fixed_columns[PLIANT_LEVEL_LIMIT + 1];
     uint64_t nnz[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
