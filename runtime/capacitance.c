@@ -30,7 +30,7 @@ static int32_t is_definite_level(const pliant_model *model, pliant_node node)
 {
     const double *summary = model->view.greens[PLIANT_FREE_FREE][node.level].summary;
     return model->domain[node.vertex] == PLIANT_DOMAIN_FREE &&
-           summary[PLIANT_SUMMARY_RESERVED] >= definite_floor;
+           summary[PLIANT_SUMMARY_DEFINITE] >= definite_floor;
 }
 
 // ---- Life ----

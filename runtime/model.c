@@ -241,7 +241,7 @@ pliant_level_info pliant_model_level(const pliant_model *model, int32_t level)
     info.rms = greens->summary[PLIANT_SUMMARY_RMS];
     info.max = greens->summary[PLIANT_SUMMARY_MAX];
     info.factor = greens->summary[PLIANT_SUMMARY_FACTOR];
-    info.smallest_eigenvalue = greens->summary[PLIANT_SUMMARY_RESERVED];
+    info.smallest_eigenvalue = greens->summary[PLIANT_SUMMARY_DEFINITE];
     return info;
 }
 
