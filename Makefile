@@ -241,7 +241,7 @@ $(OUT)/bench/%.h5: $(OUT)/pliant-precompute
 	    mpirun --quiet -n 2 $< -q --force --rms 0.05 --max 0.11 $(WAVELET) $(SAMPLE) -o $@
 bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS)  ## run the benchmarks: figures against baselines measured in the same run
 	@. scripts/environment; for b in $(BENCHES); do echo "== $${b##*/}"; \
-	    case $$b in */bench_solver | */bench_contact) models="$(BENCH_MODELS)";; *) models="";; esac; \
+	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy) models="$(BENCH_MODELS)";; *) models="";; esac; \
 	    PLIANT_BUILD=$(OUT) $$b $$models || exit 1; done
 
 # libFuzzer needs clang; everything the target needs is compiled with the sanitizers.
