@@ -24,15 +24,6 @@ int32_t pliant_capacitance_domain_count(const pliant_model *model)
     return model->view.has_supports ? 2 : 1;
 }
 
-// Is every patch of the node's level definite as stored? By interlacing none is below the smallest
-// eigenvalue of the whole level, which files tell.
-static int32_t is_definite_level(const pliant_model *model, pliant_node node)
-{
-    const double *summary = model->view.greens[PLIANT_FREE_FREE][node.level].summary;
-    return model->domain[node.vertex] == PLIANT_DOMAIN_FREE &&
-           summary[PLIANT_SUMMARY_DEFINITE] >= definite_floor;
-}
-
 // ---- Life ----
 
 void pliant_capacitance_lay_out(pliant_arena *arena, const pliant_model *model, int32_t capacity,
@@ -158,10 +149,27 @@ static void extract(const pliant_model *model, const pliant_capacitance *type,
 }
 
 // Clear the rows behind the last one, up to where kernels read.
-static void clear_tail(size_t n, size_t leading, double *matrix)
+static void clear_tail(size_t n, size_t columns, size_t leading, double *matrix)
 {
-    for (size_t j = 0; j < n; j++)
+    for (size_t j = 0; j < columns; j++)
         memset(matrix + n + j * leading, 0, (pliant_dense_stride(n) - n) * sizeof *matrix);
+}
+
+void pliant_capacitance_plan_members(const pliant_model *model, pliant_capacitance_scratch *scratch,
+                                     pliant_capacitance *type)
+{
+    plan_members(model, type->nodes, NULL, type->count, scratch, type->plan, type->slot);
+}
+
+void pliant_capacitance_extract_columns(const pliant_model *model, int32_t begin, int32_t end,
+                                        pliant_capacitance_scratch *scratch,
+                                        pliant_capacitance *type)
+{
+    extract(model, type, type->plan, type->slot, NULL, type->count, begin, end, scratch,
+            type->matrix);
+    const size_t first = 3 * (size_t)begin * type->leading;
+    clear_tail(3 * (size_t)type->count, 3 * (size_t)(end - begin), type->leading,
+               type->matrix + first);
 }
 
 void pliant_capacitance_plan(const pliant_model *model, const pliant_node *nodes, int32_t count,
@@ -169,15 +177,16 @@ void pliant_capacitance_plan(const pliant_model *model, const pliant_node *nodes
 {
     type->count = count;
     memcpy(type->nodes, nodes, (size_t)count * sizeof *nodes);
-    plan_members(model, nodes, NULL, count, scratch, type->plan, type->slot);
+    pliant_capacitance_plan_members(model, scratch, type);
 }
 
 void pliant_capacitance_extract(const pliant_model *model, const pliant_capacitance *type,
                                 pliant_capacitance_scratch *scratch, double *matrix)
 {
+    const size_t n = 3 * (size_t)type->count;
     extract(model, type, type->plan, type->slot, NULL, type->count, 0, type->count, scratch,
             matrix);
-    clear_tail(3 * (size_t)type->count, type->leading, matrix);
+    clear_tail(n, n, type->leading, matrix);
 }
 
 // ---- From values to M ----
@@ -252,7 +261,7 @@ static int32_t is_definite(const pliant_capacitance *type, double shift,
                 (type->matrix[i + j * leading] + type->matrix[j + i * leading]) / 2;
         half[j + j * leading] += shift;
     }
-    clear_tail(n, leading, half);
+    clear_tail(n, n, leading, half);
     return pliant_dense_definite(n, leading, half, scratch->work);
 }
 
@@ -292,14 +301,20 @@ static int32_t store_product(const pliant_model *model, pliant_capacitance *type
     return !has_overflow;
 }
 
-// M^-1 and the product from M. 0 when M is singular to float precision.
-static int32_t invert(const pliant_model *model, pliant_capacitance_scratch *scratch,
-                      pliant_capacitance *type)
+static void copy_matrix(pliant_capacitance *type)
 {
     const size_t n = 3 * (size_t)type->count;
     for (size_t j = 0; j < n; j++)
         memcpy(type->inverse + j * type->leading, type->matrix + j * type->leading,
                pliant_dense_stride(n) * sizeof(double));
+}
+
+// M^-1 and the product from M. 0 when M is singular to float precision.
+static int32_t invert(const pliant_model *model, pliant_capacitance_scratch *scratch,
+                      pliant_capacitance *type)
+{
+    const size_t n = 3 * (size_t)type->count;
+    copy_matrix(type);
     // Entries carry float rounding, n of them a row: pivots below n 2^-24 of the largest are noise.
     const double least_pivot = (double)n * 0x1p-24;
     return pliant_dense_invert(n, type->leading, type->inverse, scratch->pivots, scratch->work) >
@@ -322,23 +337,37 @@ static int32_t invert_shifted(const pliant_model *model, pliant_capacitance_scra
     return 0;
 }
 
-static int32_t is_known_definite(const pliant_model *model, const pliant_capacitance *type)
+pliant_dense_progress pliant_capacitance_sweep_step(const pliant_model *model,
+                                                    pliant_capacitance_scratch *scratch,
+                                                    pliant_dense_sweep *sweep,
+                                                    pliant_capacitance *type)
 {
-    for (int32_t i = 0; i < type->count; i++)
-        if (type->nodes[i].level != type->nodes[0].level ||
-            !is_definite_level(model, type->nodes[i]))
-            return 0;
-    return 1;
+    if (sweep->panel == 0 && !sweep->has_panel) copy_matrix(type);
+    const pliant_dense_progress progress =
+        pliant_dense_sweep_step(3 * (size_t)type->count, type->leading, type->inverse,
+                                definite_floor / 2, scratch->work, sweep);
+    if (progress != PLIANT_DENSE_DONE) return progress;
+    type->status = PLIANT_OK;
+    return store_product(model, type) ? PLIANT_DENSE_DONE : PLIANT_DENSE_REFUSED;
 }
 
+static int32_t sweep_all(const pliant_model *model, pliant_capacitance_scratch *scratch,
+                         pliant_capacitance *type)
+{
+    pliant_dense_sweep state = {0};
+    pliant_dense_progress progress;
+    do progress = pliant_capacitance_sweep_step(model, scratch, &state, type);
+    while (progress == PLIANT_DENSE_MORE);
+    return progress == PLIANT_DENSE_DONE;
+}
+
+// A definite matrix needs no pivoting, and its pivots tell that it is one.
 static int32_t settle_passive(const pliant_model *model, pliant_capacitance_scratch *scratch,
                               pliant_capacitance *type)
 {
     type->status = PLIANT_OK;
-    if ((is_known_definite(model, type) || is_definite(type, -definite_floor / 2, scratch)) &&
-        invert(model, scratch, type))
-        return 1;
-    return invert_shifted(model, scratch, type, definite_floor, shift_factor, definite_floor);
+    return sweep_all(model, scratch, type) ||
+           invert_shifted(model, scratch, type, definite_floor, shift_factor, definite_floor);
 }
 
 static int32_t settle_stored(const pliant_model *model, pliant_capacitance_scratch *scratch,
@@ -364,17 +393,29 @@ static void settle(const pliant_model *model, pliant_capacitance_scratch *scratc
     memset(type->product, 0, n * type->stride * sizeof *type->product);
 }
 
-void pliant_capacitance_invert(const pliant_model *model, pliant_capacitance_scratch *scratch,
-                               pliant_capacitance *type)
+void pliant_capacitance_set_scales(const pliant_model *model, pliant_capacitance *type)
 {
-    type->shift = scratch->held_shift;
     type->residual = 0;
     type->update_count = 0;
     memset(type->largest, 0, sizeof type->largest);
     for (int32_t i = 0; i < type->count; i++) note_diagonal(model, type, i);
     for (int32_t i = 0; i < type->count; i++) set_scale(model, type, i);
-    for (int32_t j = 0; j < type->count; j++)
+}
+
+void pliant_capacitance_weigh_columns(const pliant_model *model, int32_t begin, int32_t end,
+                                      pliant_capacitance_scratch *scratch,
+                                      pliant_capacitance *type)
+{
+    for (int32_t j = begin; j < end; j++)
         for (int32_t i = 0; i <= j; i++) weigh_pair(model, scratch, type, i, j);
+}
+
+void pliant_capacitance_invert(const pliant_model *model, pliant_capacitance_scratch *scratch,
+                               pliant_capacitance *type)
+{
+    type->shift = scratch->held_shift;
+    pliant_capacitance_set_scales(model, type);
+    pliant_capacitance_weigh_columns(model, 0, type->count, scratch, type);
     settle(model, scratch, type);
 }
 
@@ -477,7 +518,7 @@ void pliant_capacitance_extend(const pliant_model *model, int32_t kept,
     for (int32_t i = kept; i < count; i++) set_scale(model, type, i);
     for (int32_t j = kept; j < count; j++)
         for (int32_t i = 0; i <= j; i++) weigh_pair(model, scratch, type, i, j);
-    clear_tail(3 * (size_t)count, type->leading, type->matrix);
+    clear_tail(3 * (size_t)count, 3 * (size_t)count, type->leading, type->matrix);
 }
 
 // Append the members first .. type->count - 1, whose M is there, to the inverse one by one.
@@ -541,7 +582,7 @@ int32_t pliant_capacitance_update(const pliant_model *model, const pliant_node *
         }
     pliant_capacitance_extend(model, kept, scratch, type);
     if (!append(type, kept, scratch)) return 0;
-    clear_tail(3 * (size_t)count, type->leading, type->inverse);
+    clear_tail(3 * (size_t)count, 3 * (size_t)count, type->leading, type->inverse);
     type->residual = residual_of(type, scratch);
     if (!(type->residual <= drift_limit)) return 0;
     return store_product(model, type);

@@ -33,6 +33,7 @@
 // is looked at after every update.
 #pragma once
 
+#include "dense.h"
 #include "model.h"
 #include "reconstruction.h"
 
@@ -121,6 +122,24 @@ void pliant_capacitance_plan(const pliant_model *model, const pliant_node *nodes
                              pliant_capacitance_scratch *scratch, pliant_capacitance *capacitance);
 void pliant_capacitance_extract(const pliant_model *model, const pliant_capacitance *capacitance,
                                 pliant_capacitance_scratch *scratch, double *matrix);
+// Build in parts, for those who have no time for the whole; each leaves the type for the next, and
+// nodes, order, count and shift are the caller's to set: plan the members; extract columns begin ..
+// end - 1; when all are there, set the scales; weigh columns begin .. end - 1, ascending; invert in
+// slices, beginning with a zeroed state.
+void pliant_capacitance_plan_members(const pliant_model *model, pliant_capacitance_scratch *scratch,
+                                     pliant_capacitance *capacitance);
+void pliant_capacitance_extract_columns(const pliant_model *model, int32_t begin, int32_t end,
+                                        pliant_capacitance_scratch *scratch,
+                                        pliant_capacitance *capacitance);
+void pliant_capacitance_set_scales(const pliant_model *model, pliant_capacitance *capacitance);
+void pliant_capacitance_weigh_columns(const pliant_model *model, int32_t begin, int32_t end,
+                                      pliant_capacitance_scratch *scratch,
+                                      pliant_capacitance *capacitance);
+// DONE: the type is whole, and not rough.
+pliant_dense_progress pliant_capacitance_sweep_step(const pliant_model *model,
+                                                    pliant_capacitance_scratch *scratch,
+                                                    pliant_dense_sweep *sweep,
+                                                    pliant_capacitance *capacitance);
 // After extract: the rest of build.
 void pliant_capacitance_invert(const pliant_model *model, pliant_capacitance_scratch *scratch,
                                pliant_capacitance *capacitance);

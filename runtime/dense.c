@@ -127,21 +127,26 @@ static void swap_rows(size_t n, size_t stride, double *matrix, size_t a, size_t 
 }
 
 // Eliminate the columns K = k .. k+width-1 of all rows, in place: afterwards they hold what the
-// product G of these steps makes of the unit vectors e_K. 0 when a pivot vanishes.
+// product G of these steps makes of the unit vectors e_K. 0 when a pivot vanishes. `pivots` NULL: no
+// rows are swapped, and pivots have to be above *least.
 INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, double *matrix,
                                int32_t *pivots, double *least, double *most)
 {
     const size_t rows = pliant_dense_stride(n);
     for (size_t c = k; c < k + width; c++) {
         double *column = matrix + c * stride;
-        size_t pivot = c;
-        for (size_t i = c + 1; i < n; i++)
-            if (fabs(column[i]) > fabs(column[pivot])) pivot = i;
-        pivots[c] = (int32_t)pivot;
-        if (pivot != c) swap_rows(n, stride, matrix, c, pivot);
+        if (pivots) {
+            size_t pivot = c;
+            for (size_t i = c + 1; i < n; i++)
+                if (fabs(column[i]) > fabs(column[pivot])) pivot = i;
+            pivots[c] = (int32_t)pivot;
+            if (pivot != c) swap_rows(n, stride, matrix, c, pivot);
+        } else if (!(column[c] > *least)) {
+            return 0;
+        }
         const double magnitude = fabs(column[c]);
         if (!(magnitude > 0) || !isfinite(1 / magnitude)) return 0;
-        *least = fmin(*least, magnitude);
+        if (pivots) *least = fmin(*least, magnitude);
         *most = fmax(*most, magnitude);
         const double inverse = 1 / column[c];
         // The column itself becomes that of G: -column / pivot, and 1 / pivot at the pivot.
@@ -158,6 +163,19 @@ INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, 
     return 1;
 }
 
+// Columns first .. last - 1, none of the panel's, after the panel K was eliminated.
+INLINE void update_columns(size_t rows, size_t stride, size_t k, size_t width, size_t first,
+                           size_t last, double *matrix, double *work)
+{
+    for (size_t j = first; j < last; j++) {
+        double *taken = matrix + k + j * stride, *kept = work + (j - first) * PLIANT_DENSE_PANEL;
+        memcpy(kept, taken, width * sizeof *kept);
+        memset(taken, 0, width * sizeof *taken);
+    }
+    multiply_add(rows, last - first, width, matrix + k * stride, stride, work, PLIANT_DENSE_PANEL,
+                 matrix + first * stride, stride);
+}
+
 // A panel K at a time: G = I + (T - E_K) E_K^T with T the eliminated panel, so the other columns J
 // become A[:,J] - E_K A[K,J] + T A[K,J].
 PLIANT_VECTOR_CLONES
@@ -169,16 +187,8 @@ double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *piv
     for (size_t k = 0; k < n; k += panel) {
         const size_t width = n - k < panel ? n - k : panel;
         if (!eliminate_panel(n, stride, k, width, matrix, pivots, &least, &most)) return 0;
-        for (size_t j = 0; j < n; j++) {
-            if (j >= k && j < k + width) continue;
-            double *taken = matrix + k + j * stride, *kept = work + j * panel;
-            memcpy(kept, taken, width * sizeof *kept);
-            memset(taken, 0, width * sizeof *taken);
-        }
-        const double *t = matrix + k * stride;
-        multiply_add(rows, k, width, t, stride, work, panel, matrix, stride);
-        multiply_add(rows, n - k - width, width, t, stride, work + (k + width) * panel, panel,
-                     matrix + (k + width) * stride, stride);
+        update_columns(rows, stride, k, width, 0, k, matrix, work);
+        update_columns(rows, stride, k, width, k + width, n, matrix, work);
     }
     // (P A)^-1 P: the row swaps, undone on the columns, last first.
     for (size_t c = n; c-- > 0;) {
@@ -191,6 +201,35 @@ double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *piv
         }
     }
     return n ? least / most : 1;
+}
+
+PLIANT_VECTOR_CLONES
+pliant_dense_progress pliant_dense_sweep_step(size_t n, size_t stride, double *matrix,
+                                              double least_pivot, double *work,
+                                              pliant_dense_sweep *sweep)
+{
+    enum { panel = PLIANT_DENSE_PANEL };
+    if (sweep->panel >= n) return PLIANT_DENSE_DONE;
+    const size_t k = sweep->panel, width = n - k < panel ? n - k : panel;
+    if (!sweep->has_panel) {
+        double most = 0;
+        if (!eliminate_panel(n, stride, k, width, matrix, NULL, &least_pivot, &most))
+            return PLIANT_DENSE_REFUSED;
+        sweep->has_panel = 1;
+        sweep->column = 0;
+    } else {
+        // Panels begin at multiples of the panel's width, so groups of columns do not straddle.
+        const size_t first = sweep->column, left = n - first;
+        const size_t last = first + (left < panel ? left : panel);
+        if (first != k)
+            update_columns(pliant_dense_stride(n), stride, k, width, first, last, matrix, work);
+        sweep->column = last;
+    }
+    if (sweep->column >= n) {
+        sweep->panel = k + width;
+        sweep->has_panel = 0;
+    }
+    return sweep->panel >= n ? PLIANT_DENSE_DONE : PLIANT_DENSE_MORE;
 }
 
 PLIANT_VECTOR_CLONES

@@ -34,6 +34,22 @@ int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *w
 // over the largest, 0 when a pivot vanished (the matrix is then garbage). `pivots` has shape [n].
 double pliant_dense_invert(size_t n, size_t stride, double *matrix, int32_t *pivots, double *work);
 
+// The same without pivoting, for matrices whose symmetric part is positive definite, in slices: so
+// that a caller with a deadline can stop between them. Zero the state, then step until it says so.
+typedef struct pliant_dense_sweep {
+    size_t panel, column;  // eliminated so far, and updated by the panel at hand
+    int32_t has_panel;
+} pliant_dense_sweep;
+typedef enum pliant_dense_progress {
+    PLIANT_DENSE_REFUSED = -1,  // a pivot is not above `least_pivot`: not definite; garbage is left
+    PLIANT_DENSE_DONE = 0,
+    PLIANT_DENSE_MORE = 1,
+} pliant_dense_progress;
+// One slice: some 2 n PLIANT_DENSE_PANEL^2 operations. `work` as for invert, not kept between slices.
+pliant_dense_progress pliant_dense_sweep_step(size_t n, size_t stride, double *matrix,
+                                              double least_pivot, double *work,
+                                              pliant_dense_sweep *sweep);
+
 // y = A x; `y` has shape [stride], 64-byte aligned: rows n .. stride-1 of A must be zero.
 void pliant_dense_multiply(size_t n, size_t stride, const float *matrix, const float *x, float *y);
 

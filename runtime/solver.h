@@ -5,6 +5,7 @@
 #include "compact.h"
 #include "cost.h"
 #include "model.h"
+#include "pending.h"
 
 // A node of S: its specified value, and after a solve the one of reference type that realises it.
 typedef struct pliant_constraint {
@@ -88,6 +89,7 @@ struct pliant_solver {
     pliant_capacitance_scratch scratch;
     pliant_capacitance extended;  // S and the nodes of pliant_solver_compliance
     double compliance_shift;      // of its answers, while contact lasts
+    pliant_pending pending;       // what a late solve was asked for
     pliant_cost cost;
     pliant_constraint *candidate;  // shape [capacity]: S on a coarser level
     pliant_node *key;              // shape [capacity]
@@ -116,6 +118,9 @@ pliant_vec3 pliant_solver_boundary_value(const pliant_solver *solver, int32_t ve
 // Step (2), types.c: resolve the constraints so that the solve ends by `deadline` and have the type
 // of that set. solver->solved and solved_count become the set; the report is filled in.
 const pliant_capacitance *pliant_solver_resolve(pliant_solver *solver, int64_t deadline);
+
+// types.c: use what is left until `deadline` for the set that was asked for, when it was not solved.
+void pliant_solver_prepare(pliant_solver *solver, int64_t deadline);
 
 // Step (6): bring a domain's g up to date as coefficients.
 void pliant_solver_sum(pliant_solver *solver, int32_t domain);

@@ -33,7 +33,13 @@ static int32_t is_soft(const pliant_solver *solver, const pliant_capacitance *ty
     return type->shift >= solver->scratch.held_shift;
 }
 
-static plan plan_set(const pliant_solver *solver, const pliant_constraint *set, int32_t count)
+// Is this the type of solver->key?
+static int32_t is_kept(const pliant_solver *solver, const pliant_capacitance *type, int32_t count)
+{
+    return is_soft(solver, type) && pliant_capacitance_matches(type, solver->key, count);
+}
+
+static plan plan_set(pliant_solver *solver, const pliant_constraint *set, int32_t count)
 {
     const pliant_model *model = solver->model;
     uint64_t blocks = 0;
@@ -46,11 +52,13 @@ static plan plan_set(const pliant_solver *solver, const pliant_constraint *set, 
         solver->key[i] = node;
     }
     const double contact = pliant_cost_of_contact(&solver->cost, count, blocks);
+    pliant_pending *pending = &solver->pending;
+    if (pending->stage == PLIANT_PENDING_WHOLE && is_kept(solver, &pending->type, count))
+        return (plan){.found = &pending->type, .total_ns = contact};
     plan best = {.make_ns = pliant_cost_of_build(&solver->cost, count)};
     for (int32_t t = 0; t < solver->cache_count; t++) {
         pliant_capacitance *type = &solver->types[t];
-        if (is_soft(solver, type) && pliant_capacitance_matches(type, solver->key, count))
-            return (plan){.found = type, .total_ns = contact};
+        if (is_kept(solver, type, count)) return (plan){.found = type, .total_ns = contact};
         if (!is_sound(solver, type)) continue;
         const pliant_capacitance_difference difference =
             pliant_capacitance_compare(type, solver->key, count);
@@ -183,4 +191,22 @@ const pliant_capacitance *pliant_solver_resolve(pliant_solver *solver, int64_t d
     if (solver->scratch.compliance == PLIANT_COMPLIANCE_PASSIVE && isfinite(type->shift))
         solver->scratch.held_shift = type->shift;
     return type;
+}
+
+void pliant_solver_prepare(pliant_solver *solver, int64_t deadline)
+{
+    const int32_t count = solver->constraint_count;
+    for (int32_t i = 0; i < count; i++) solver->key[i] = solver->constraints[i].node;
+    pliant_pending *pending = &solver->pending;
+    pliant_pending_advance(solver->model, solver->key, count, deadline, &solver->scratch, pending);
+    solver->report.prepared = (float)pliant_pending_part(pending);
+    if (pending->stage != PLIANT_PENDING_WHOLE) return;
+    // It takes a place among the types; where the only one is in use, it is found where it is.
+    pliant_capacitance *place = oldest_type(solver, solver->solved_type);
+    if (place == solver->solved_type) return;
+    const pliant_capacitance replaced = *place;
+    *place = pending->type;
+    place->last_used = solver->solve_count;
+    pending->type = replaced;
+    pending->stage = PLIANT_PENDING_NONE;
 }

@@ -699,6 +699,54 @@ static void without_time_the_constraints_are_resolved_on_coarser_levels(void **s
     tear_down(&f);
 }
 
+static void a_contact_that_rests_is_resolved_as_stated_after_some_solves(void **state)
+{
+    (void)state;
+    for (int32_t cache = 1; cache <= 2; cache++)
+        for (int rule = 0; rule < 2; rule++) {
+            pliant_solver_def def = roomy;
+            def.cache_count = cache;
+            def.compliance = rule ? PLIANT_COMPLIANCE_PASSIVE : PLIANT_COMPLIANCE_STORED;
+            fixture f = set_up(0, CHECK_FREE_BLOCK, def);
+            const double *x = f.model->view.vertices;
+            for (int32_t v = 0; v < vertex_count; v++)
+                if (pliant_model_is_free(f.model, v) && x[3 * v] > 0.1)
+                    assert_true(pliant_solver_displace(f.solver, (pliant_node){finest, v},
+                                                       (pliant_vec3){-0.05f, 0, 0}) <= 0);
+            const double all =
+                pliant_cost_of_build(&f.solver->cost, pliant_solver_constraint_count(f.solver));
+            int late = 0;
+            float prepared = 0;
+            while (late < 1000) {
+                const pliant_status status =
+                    pliant_solver_solve(f.solver, pliant_clock_ns() + (int64_t)(0.5 * all));
+                const pliant_solver_report report = pliant_solver_last(f.solver);
+                if (!report.is_late) break;
+                assert_int_equal(status, PLIANT_LATE);
+                check_at_least(report.prepared, prepared);
+                prepared = report.prepared;
+                late++;
+            }
+            assert_in_range(late, 1, 999);
+            assert_int_equal(pliant_solver_last(f.solver).level, finest);
+            assert_int_equal(pliant_solver_last(f.solver).factored, 0);
+            // As good as made in one piece.
+            pliant_solver *other = NULL;
+            check_ok(pliant_solver_create(f.model, &def, &other, NULL), NULL);
+            for (int32_t v = 0; v < vertex_count; v++)
+                if (pliant_model_is_free(f.model, v) && x[3 * v] > 0.1)
+                    assert_true(pliant_solver_displace(other, (pliant_node){finest, v},
+                                                       (pliant_vec3){-0.05f, 0, 0}) <= 0);
+            assert_int_equal(pliant_solver_solve(other, PLIANT_NEVER), PLIANT_OK);
+            assert_int_equal(pliant_solver_last(other).factored, 1);
+            const pliant_vec3 a = pliant_solver_contact_force(f.solver);
+            const pliant_vec3 b = pliant_solver_contact_force(other);
+            check_near(a.x / b.x, 1, 1e-5);
+            pliant_solver_destroy(other);
+            tear_down(&f);
+        }
+}
+
 static void the_finest_level_that_fits_is_taken(void **state)
 {
     (void)state;
@@ -742,6 +790,7 @@ int main(void)
         cmocka_unit_test(a_raise_stays_until_contact_ends),
         cmocka_unit_test(compliance_is_what_unit_forces_do),
         cmocka_unit_test(without_time_the_constraints_are_resolved_on_coarser_levels),
+        cmocka_unit_test(a_contact_that_rests_is_resolved_as_stated_after_some_solves),
         cmocka_unit_test(the_finest_level_that_fits_is_taken),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -151,8 +151,9 @@ pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose 
 // operation counts calibrated at create, would end after it, the constraints are resolved on the
 // finest level that fits (GF 8.2): a constraint on a finer level stays when its vertex belongs to
 // that level, with that level's hat; it is left out when such a hat covers its vertex; else it
-// stays as it is. Then the status is PLIANT_LATE, the state is valid, and the next solve starts
-// from the full set again. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of
+// stays as it is. Then the status is PLIANT_LATE and the state is valid. What time is left goes into
+// the inverse of the full set, so that a contact that rests is resolved as stated after some
+// solves. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of
 // this patch is not positive definite; finite, displacements at S as specified, but forces are
 // unreliable.
 PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline);
@@ -182,6 +183,7 @@ typedef struct pliant_solver_report {
     int32_t asked_count;       // s of what was stated
     int32_t level;             // finest constraint level used; finest stored one without constraints
     int32_t is_late;           // 1: resolved on a coarser level than stated
+    float prepared;            // part of the stated set's inverse that late solves have made, 0 to 1
     int32_t factored;       // 1: a new boundary-value-problem type was factored from scratch
     int32_t updated;        // nodes that an inverse was updated for; 0 and 0: found in the cache
     int32_t summed_columns;  // columns added because they changed (GF-11)
