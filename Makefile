@@ -228,7 +228,7 @@ $(OUT)/tests/bench/%: $(OBJ)/tests/bench/%.o $(LIB_support) $(if $(HAVE_PETSC),$
 $(OUT)/tests/%: $(OBJ)/tests/%.o $(TEST_LIBS)
 	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
 
-tests: $(TESTS)  ## build the tests
+tests: $(TESTS) $(BENCHES)  ## build the tests and the benchmarks
 check: $(PROGRAMS) $(TESTS)  ## run the tests; T=pattern chooses (make check T=wavelet)
 	@$(if $(HAVE_CMOCKA),:,echo "tests need libcmocka-dev"; exit 1)
 	@PLIANT_BUILD=$(OUT) scripts/run-tests $(TESTS)
