@@ -125,6 +125,45 @@ static void definiteness_is_the_sign_of_the_smallest_eigenvalue(void **state)
     free(s);
 }
 
+static void a_sweep_in_slices_equals_the_inverse_and_refuses_what_is_not_definite(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(5);
+    storage *s = take_storage();
+    for (int k = 0; k < size_count; k++)
+        for (int definite = 0; definite < 2; definite++) {
+            const size_t n = (size_t)sizes[k], stride = pliant_dense_stride(n);
+            fill(&random, s->matrix, n, stride);
+            // A diagonal of one, elements of 1 / n: definite; then one pivot of -1/2.
+            for (size_t j = 0; j < n; j++)
+                for (size_t i = 0; i < n; i++)
+                    s->matrix[i + j * stride] =
+                        i == j ? 1 : s->matrix[i + j * stride] / (2 * (double)n);
+            if (!definite) s->matrix[n / 2 + n / 2 * stride] = -0.5;
+            memcpy(s->copy, s->matrix, n * stride * sizeof(double));
+            pliant_dense_sweep sweep = {0};
+            pliant_dense_progress progress = PLIANT_DENSE_MORE;
+            size_t slices = 0;
+            while (progress == PLIANT_DENSE_MORE) {
+                progress =
+                    pliant_dense_sweep_step(n, stride, s->matrix, 0.25, s->work, &sweep);
+                memset(s->work, 0x7f, sizeof s->work);  // others use it between slices
+                slices++;
+            }
+            if (!definite) {
+                assert_int_equal(progress, PLIANT_DENSE_REFUSED);
+                continue;
+            }
+            assert_int_equal(progress, PLIANT_DENSE_DONE);
+            const size_t panels = (n + PLIANT_DENSE_PANEL - 1) / PLIANT_DENSE_PANEL;
+            assert_int_equal(slices, panels * (panels + 1));
+            assert_true(pliant_dense_invert(n, stride, s->copy, s->pivots, s->work) > 0);
+            for (size_t i = 0; i < n * stride; i++)
+                check_near(s->matrix[i], s->copy[i], 1e-14);  // elements of about one
+        }
+    free(s);
+}
+
 static void the_product_equals_the_sum(void **state)
 {
     (void)state;
@@ -155,6 +194,7 @@ int main(void)
         cmocka_unit_test(the_inverse_times_the_matrix_is_one),
         cmocka_unit_test(a_singular_matrix_has_pivot_ratio_zero_or_round_off),
         cmocka_unit_test(definiteness_is_the_sign_of_the_smallest_eigenvalue),
+        cmocka_unit_test(a_sweep_in_slices_equals_the_inverse_and_refuses_what_is_not_definite),
         cmocka_unit_test(the_product_equals_the_sum),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
