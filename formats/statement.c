@@ -183,39 +183,36 @@ static pliant_status parse_name(cursor *c, pliant_statement *s)
     return PLIANT_OK;
 }
 
-// K | L:K | source K | near X Y Z
+// [L:] before K, source K or near X Y Z
 static pliant_status parse_vertex(cursor *c, pliant_vertex_name *vertex)
 {
-    int64_t number;
-    const word w = peek(c);
-    if (is_word(w, "near")) {
-        take(c);
+    static const char expected[] = "a vertex: [L:]K, [L:]source K or [L:]near X Y Z";
+    const word whole = take(c);
+    int64_t number = 0;
+    size_t length = read_integer(whole.text, whole.length, INT32_MAX, &number);
+    word place = whole;
+    if (length > 0 && length < whole.length && whole.text[length] == ':') {
+        vertex->has_level = 1;
+        vertex->level = (int32_t)number;
+        place.text += length + 1;
+        place.length -= length + 1;
+        length = read_integer(place.text, place.length, INT32_MAX, &number);
+    }
+    if (is_word(place, "near")) {
         vertex->kind = PLIANT_VERTEX_NEAR;
         return parse_vector(c, vertex->position);
     }
-    if (is_word(w, "source")) {
-        take(c);
+    if (is_word(place, "source")) {
         vertex->kind = PLIANT_VERTEX_SOURCE;
         const pliant_status status =
             parse_integer(c, "the number of a vertex of the input mesh", 0, INT32_MAX, &number);
         if (status == PLIANT_OK) vertex->number = (int32_t)number;
         return status;
     }
-    take(c);
-    const char *expected = "a vertex: K, L:K, source K or near X Y Z";
-    size_t length = read_integer(w.text, w.length, INT32_MAX, &number);
-    if (length == 0) return refuse(c, PLIANT_ERR_FORMAT, w, expected);
+    if (length == 0 || length != place.length) return refuse(c, PLIANT_ERR_FORMAT, whole, expected);
     vertex->kind = PLIANT_VERTEX_MODEL;
-    if (length < w.length && w.text[length] == ':') {
-        vertex->kind = PLIANT_VERTEX_LEVEL;
-        vertex->level = (int32_t)number;
-        const size_t colon = length + 1;
-        length = read_integer(w.text + colon, w.length - colon, INT32_MAX, &number);
-        if (length == 0) return refuse(c, PLIANT_ERR_FORMAT, w, expected);
-        length += colon;
-    }
     vertex->number = (int32_t)number;
-    return length == w.length ? PLIANT_OK : refuse(c, PLIANT_ERR_FORMAT, w, expected);
+    return PLIANT_OK;
 }
 
 // ---- Statements ----

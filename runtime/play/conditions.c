@@ -2,7 +2,6 @@
 #include "conditions.h"
 
 #include "pliant/error.h"
-#include "pliant/hierarchy.h"
 
 #include <stdlib.h>
 
@@ -15,11 +14,8 @@ struct pliant_conditions {
     pliant_condition *list;
     int32_t count, capacity;
     pliant_vec3 gravity;
-    // 1 + the place in list of vertex v on level l, at node_offset[l] + v; 0 in the reference
-    // condition.
-    int32_t *slot;
-    size_t node_offset[PLIANT_LEVEL_LIMIT + 2];
-    int32_t node_count;  // over all levels, at most INT32_MAX
+    int32_t *slot;  // [n] 1 + the place in list of a vertex; 0 in the reference condition
+    int32_t vertex_count;
 };
 
 typedef enum growth {
@@ -28,26 +24,22 @@ typedef enum growth {
     GROW_BOTH = 3,
 } growth;
 
-pliant_status pliant_conditions_create(const pliant_model *model, pliant_conditions **conditions,
-                                       pliant_error *err)
+pliant_status pliant_conditions_create(const pliant_model *model, pliant_compliance compliance,
+                                       pliant_conditions **conditions, pliant_error *err)
 {
     pliant_conditions *c = calloc(1, sizeof *c);
     if (!c) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a script's state");
-    const int32_t level_count = pliant_model_describe(model).level_count;
-    for (int32_t l = 0; l < level_count; l++)
-        c->node_offset[l + 1] =
-            c->node_offset[l] + (size_t)pliant_model_level_vertex_count(model, l);
-    const size_t node_count = c->node_offset[level_count];
     c->model = model;
-    c->node_count = node_count < INT32_MAX ? (int32_t)node_count : INT32_MAX;
+    c->vertex_count = pliant_model_describe(model).vertex_count;
     c->capacity = FIRST_CAPACITY;
-    c->slot = calloc(node_count, sizeof *c->slot);
+    c->slot = calloc((size_t)c->vertex_count, sizeof *c->slot);
     c->list = calloc(FIRST_CAPACITY, sizeof *c->list);
     c->solver_def = pliant_solver_default(model);
+    c->solver_def.compliance = compliance;
     pliant_status status = PLIANT_OK;
     if (!c->slot || !c->list)
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the state of %zu nodes",
-                                  node_count);
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the state of %d vertices",
+                                  (int)c->vertex_count);
     if (status == PLIANT_OK) status = pliant_solver_create(model, &c->solver_def, &c->solver, err);
     if (status < 0) {
         pliant_conditions_destroy(c);
@@ -81,7 +73,7 @@ static pliant_status apply(pliant_solver *solver, const pliant_condition *condit
     return PLIANT_ERR_ARGUMENT;
 }
 
-// Twice a capacity, at most one place per node. Returns 0 when it was that already.
+// Twice a capacity, at most one place per vertex. Returns 0 when it was that already.
 static int enlarge(int32_t *capacity, int32_t limit)
 {
     if (*capacity >= limit) return 0;
@@ -94,8 +86,9 @@ static pliant_status grow(pliant_conditions *conditions, growth what)
 {
     pliant_solver_def def = conditions->solver_def;
     int grown = 0;
-    if (what & GROW_CONSTRAINTS) grown |= enlarge(&def.constraint_capacity, conditions->node_count);
-    if (what & GROW_LOADS) grown |= enlarge(&def.load_capacity, conditions->node_count);
+    if (what & GROW_CONSTRAINTS)
+        grown |= enlarge(&def.constraint_capacity, conditions->vertex_count);
+    if (what & GROW_LOADS) grown |= enlarge(&def.load_capacity, conditions->vertex_count);
     if (!grown) return PLIANT_ERR_CAPACITY;
 
     pliant_solver *solver = NULL;
@@ -123,23 +116,7 @@ static growth growth_for(const pliant_conditions *conditions, const pliant_condi
     return condition->kind == PLIANT_CONDITION_PRESSED && !is_free ? GROW_BOTH : GROW_LOADS;
 }
 
-pliant_status pliant_conditions_solve(pliant_conditions *conditions)
-{
-    pliant_status status = pliant_solver_solve(conditions->solver, PLIANT_NEVER);
-    while (status == PLIANT_ERR_CAPACITY) {
-        status = grow(conditions, GROW_BOTH);
-        if (status < 0) return status;
-        status = pliant_solver_solve(conditions->solver, PLIANT_NEVER);
-    }
-    return status;
-}
-
 // ---- Changes ----
-
-static int32_t *slot_of(const pliant_conditions *conditions, pliant_node node)
-{
-    return &conditions->slot[conditions->node_offset[node.level] + (size_t)node.vertex];
-}
 
 static pliant_status reserve_one(pliant_conditions *conditions)
 {
@@ -155,7 +132,7 @@ static pliant_status reserve_one(pliant_conditions *conditions)
 pliant_status pliant_conditions_set(pliant_conditions *conditions,
                                     const pliant_condition *condition)
 {
-    int32_t *slot = slot_of(conditions, condition->node);
+    int32_t *slot = &conditions->slot[condition->node.vertex];
     pliant_status status = *slot == 0 ? reserve_one(conditions) : PLIANT_OK;
     if (status < 0) return status;
     status = apply(conditions->solver, condition);
@@ -177,17 +154,18 @@ pliant_status pliant_conditions_set_gravity(pliant_conditions *conditions, plian
     return status;
 }
 
-pliant_status pliant_conditions_drop(pliant_conditions *conditions, pliant_node node)
+pliant_status pliant_conditions_drop(pliant_conditions *conditions, int32_t vertex)
 {
     // Releasing what is in its reference condition changes nothing, whatever the file holds.
-    int32_t *slot = slot_of(conditions, node);
+    int32_t *slot = &conditions->slot[vertex];
     if (*slot == 0) return PLIANT_OK;
-    const pliant_status status = pliant_solver_release(conditions->solver, node);
+    const pliant_status status =
+        pliant_solver_release(conditions->solver, conditions->list[*slot - 1].node);
     if (status < 0) return status;
     // The last condition takes the place of the dropped one.
     const pliant_condition moved = conditions->list[--conditions->count];
     conditions->list[*slot - 1] = moved;
-    *slot_of(conditions, moved.node) = *slot;
+    conditions->slot[moved.node.vertex] = *slot;
     *slot = 0;
     return PLIANT_OK;
 }
@@ -196,7 +174,7 @@ void pliant_conditions_drop_all(pliant_conditions *conditions)
 {
     pliant_solver_release_all(conditions->solver);
     for (int32_t i = 0; i < conditions->count; i++)
-        *slot_of(conditions, conditions->list[i].node) = 0;
+        conditions->slot[conditions->list[i].node.vertex] = 0;
     conditions->count = 0;
     conditions->gravity = (pliant_vec3){0, 0, 0};
 }

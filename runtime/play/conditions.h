@@ -1,8 +1,9 @@
 // conditions.h: the boundary conditions that a script has set, and the solver that holds them.
 //
-// A pliant_solver has fixed capacities; a script has none. This keeps every node that is not in its
-// reference condition, so that when the solver runs out of room a larger one is created and handed
-// the state. Nothing else here allocates after create.
+// A pliant_solver has fixed capacities; a script has none. This keeps every vertex that is not in
+// its reference condition, on the level that the last statement about it named, so that when the
+// solver runs out of room a larger one is created and handed the state. Nothing else here allocates
+// after create.
 #pragma once
 
 #include "pliant/pliant.h"
@@ -23,6 +24,7 @@ typedef struct pliant_condition {
 typedef struct pliant_conditions pliant_conditions;
 
 PLIANT_UNUSED_RESULT pliant_status pliant_conditions_create(const pliant_model *model,
+                                                            pliant_compliance compliance,
                                                             pliant_conditions **conditions,
                                                             pliant_error *err);
 void pliant_conditions_destroy(pliant_conditions *conditions);  // NULL is fine
@@ -32,14 +34,13 @@ PLIANT_UNUSED_RESULT pliant_status pliant_conditions_set(pliant_conditions *cond
                                                          const pliant_condition *condition);
 PLIANT_UNUSED_RESULT pliant_status pliant_conditions_set_gravity(pliant_conditions *conditions,
                                                                  pliant_vec3 acceleration);
+// A vertex of the model back to its reference condition, whatever level that was stated on.
 PLIANT_UNUSED_RESULT pliant_status pliant_conditions_drop(pliant_conditions *conditions,
-                                                          pliant_node node);
+                                                          int32_t vertex);
 void pliant_conditions_drop_all(pliant_conditions *conditions);  // gravity too
-// pliant_solver_solve with as much room as it needs.
-PLIANT_UNUSED_RESULT pliant_status pliant_conditions_solve(pliant_conditions *conditions);
 
 // In no particular order; borrowed until the next change.
 const pliant_condition *pliant_conditions_list(const pliant_conditions *conditions, int32_t *count);
 pliant_vec3 pliant_conditions_gravity(const pliant_conditions *conditions);
-// Borrowed until the next change. Change it through this file only.
+// Has room for all conditions. Borrowed until the next change; change it through this file only.
 pliant_solver *pliant_conditions_solver(const pliant_conditions *conditions);

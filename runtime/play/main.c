@@ -18,9 +18,11 @@ static int complain(const pliant_error *err, int status)
     return status;
 }
 
-static int print(const char *text)
+static int print(const char *const *parts)
 {
-    if (fputs(text, stdout) >= 0 && fflush(stdout) == 0) return DONE;
+    int status = 0;
+    while (*parts && status >= 0) status = fputs(*parts++, stdout);
+    if (status >= 0 && fflush(stdout) == 0) return DONE;
     perror("pliant-play: standard output");
     return FAILED;
 }
@@ -61,6 +63,8 @@ static pliant_status play(const pliant_play_options *options, const pliant_model
     };
     def.player.script_name = is_streaming ? "standard input" : options->script;
     def.player.level = level;
+    if (options->deadline_us >= 0) def.player.deadline_ns = (int64_t)options->deadline_us * 1000;
+    if (options->passive) def.player.compliance = PLIANT_COMPLIANCE_PASSIVE;
     if (options->csv || (options->json && is_streaming))
         def.player.probe_rule = PLIANT_PROBES_FIRST;
 
@@ -74,6 +78,7 @@ static pliant_status play(const pliant_play_options *options, const pliant_model
             .info = &info,
             .threads = options->threads,
             .repeat = options->repeat,
+            .deadline_ns = def.player.deadline_ns,
             .result = &result,
             .compare = pliant_outputs_compared(outputs),
         };
@@ -130,13 +135,14 @@ int main(int argc, char **argv)
     pliant_error err;
     pliant_play_options options;
     pliant_play_request request;
+    static const char *const version[] = {"pliant-play " PLIANT_VERSION_TEXT "\n", NULL};
     if (pliant_play_options_parse(argc, argv, &options, &request, &err) < 0)
         return complain(&err, MISUSED);
     switch (request) {
     case PLIANT_PLAY_HELP:
         return print(pliant_play_help);
     case PLIANT_PLAY_VERSION:
-        return print("pliant-play " PLIANT_VERSION_TEXT "\n");
+        return print(version);
     case PLIANT_PLAY_RUN:
         break;
     }

@@ -11,79 +11,13 @@
 #include <string.h>
 #include <sys/stat.h>
 
-const char pliant_play_help[] =
-    "usage: pliant-play [options] MODEL.h5 [SCRIPT]\n"
-    "\n"
-    "Plays a contact script on a model that pliant-precompute made. SCRIPT is a file;\n"
-    "`-` or none is standard input, answered line by line: every step prints its line\n"
-    "at once, expect prints ok or the failure, other statements print nothing. After a\n"
-    "script file, a short table: timings by phase in microseconds, then the probes'\n"
-    "displacements and the total contact force at the last step.\n"
-    "\n"
-    "  -o, --output FILE.csv   one row per step: step, time, solve_us, constraints,\n"
-    "                          level, x y z of each probe's displacement, x y z of the\n"
-    "                          total contact force\n"
-    "      --frames FILE.h5    HDF5: displacement f4[steps,vertices,3], step, time,\n"
-    "                          solve_us. Needs as much disk again while it plays\n"
-    "      --vtk DIR           DIR/pliant.pvd and a .vtp per step, for ParaView: the\n"
-    "                          deformed surface, displacement, traction. DIR is made\n"
-    "                          when absent, refused when it holds another series\n"
-    "      --force             write into DIR all the same; the other files stay\n"
-    "      --lod L             reconstruct the surface up to level L only (0 coarsest).\n"
-    "                          --frames and --vtk then hold the vertices of level L;\n"
-    "                          probes and expect stay exact\n"
-    "      --repeat N          play the whole script N times, each time with a new\n"
-    "                          solver; timings are of all passes but the first, which\n"
-    "                          the table gives apart. Outputs come from the first\n"
-    "      --threads N         N solvers play the script at once on the shared model;\n"
-    "                          timings are pooled, outputs come from the first\n"
-    "      --compare DENSE.h5  solve every step with the dense matrices too (written by\n"
-    "                          pliant-precompute --dense), and print the relative RMS\n"
-    "                          and MAX differences\n"
-    "      --json              JSON instead of text: one object at the end; from\n"
-    "                          standard input also one per step and expect, a line each\n"
-    "      --no-verify         do not verify the model's checksums at the start\n"
-    "  -q, --quiet             print results only where an option asks for them\n"
-    "  -h, --help              this text\n"
-    "      --version           print the version\n"
-    "\n"
-    "solve_us and `total` are the whole step: from the state to the surface. Percentiles\n"
-    "are within 0.4%. --repeat and --threads need a script that is a regular file. With\n"
-    "-o, or --json from standard input, probes must be declared before the first step.\n"
-    "\n"
-    "The script: one statement a line, # comments; statements change the state, `step`\n"
-    "solves. A VERTEX is K (the model's number), L:K (vertex K as a constraint of level\n"
-    "L), source K (vertex K of the input mesh) or near X Y Z (the free vertex nearest to\n"
-    "a rest position).\n"
-    "\n"
-    "  pliant-script 1               first statement: version of the language\n"
-    "  probe NAME vertex VERTEX      report this vertex; also: probe NAME near X Y Z\n"
-    "  displace VERTEX X Y Z         contact displacement at a free vertex\n"
-    "  traction VERTEX X Y Z         force per area\n"
-    "  force VERTEX X Y Z            force; traction = force / vertex area\n"
-    "  support VERTEX X Y Z          displacement of a fixed vertex\n"
-    "  gravity X Y Z                 acceleration\n"
-    "  release VERTEX | release all  back to the reference condition; all: gravity too\n"
-    "  dt SECONDS                    time that a step takes, 0.001 at the start\n"
-    "  step [COUNT]                  solve now, or COUNT times\n"
-    "  expect NAME X Y Z TOLERANCE   fail when the probe is further off at the last step\n"
-    "\n"
-    "A mistake or a failed expect ends the play (typed at a terminal: it is told, and\n"
-    "the play goes on). A play that fails leaves no file under an output's name: what\n"
-    "stood there before stays.\n"
-    "\n"
-    "Exit status: 0 done, 1 failed (broken file, failed expect, full disk), 2 misused.\n"
-    "\n"
-    "example:\n"
-    "  printf 'pliant-script 1\\nprobe p vertex 812\\nforce 812 0 0 -3\\nstep\\n' |\n"
-    "      pliant-play bunny.h5\n"
-    "  pliant-play -o poke.csv --vtk poke bunny.h5 poke.script\n";
-
 enum long_only {
     OPTION_FRAMES = 256,
     OPTION_VTK,
     OPTION_FORCE,
     OPTION_LOD,
+    OPTION_DEADLINE,
+    OPTION_PASSIVE,
     OPTION_REPEAT,
     OPTION_THREADS,
     OPTION_COMPARE,
@@ -98,6 +32,8 @@ static const struct option long_options[] = {
     {"vtk", required_argument, NULL, OPTION_VTK},
     {"force", no_argument, NULL, OPTION_FORCE},
     {"lod", required_argument, NULL, OPTION_LOD},
+    {"deadline-us", required_argument, NULL, OPTION_DEADLINE},
+    {"passive", no_argument, NULL, OPTION_PASSIVE},
     {"repeat", required_argument, NULL, OPTION_REPEAT},
     {"threads", required_argument, NULL, OPTION_THREADS},
     {"compare", required_argument, NULL, OPTION_COMPARE},
@@ -109,7 +45,7 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
-static const int32_t repeat_limit = 1000000000;
+static const int32_t repeat_limit = 1000000000, deadline_limit = 1000000000;
 
 static pliant_status parse_path(const char *option, const char *text, const char **path,
                                 pliant_error *err)
@@ -141,6 +77,12 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
     case OPTION_LOD:
         // How many levels there are, the model will say.
         return pliant_option_integer("--lod", optarg, 0, INT32_MAX, &o->level, err);
+    case OPTION_DEADLINE:
+        return pliant_option_integer("--deadline-us", optarg, 0, deadline_limit, &o->deadline_us,
+                                     err);
+    case OPTION_PASSIVE:
+        o->passive = 1;
+        return PLIANT_OK;
     case OPTION_REPEAT:
         return pliant_option_integer("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
     case OPTION_THREADS:
@@ -208,12 +150,14 @@ static pliant_status check_script(const pliant_play_options *o, pliant_error *er
 pliant_status pliant_play_options_parse(int argc, char **argv, pliant_play_options *options,
                                         pliant_play_request *request, pliant_error *err)
 {
-    pliant_play_options o = {.script = "-", .level = -1, .repeat = 1, .threads = 1, .verify = 1};
+    pliant_play_options o = {
+        .script = "-", .level = -1, .repeat = 1, .threads = 1, .deadline_us = -1, .verify = 1};
     opterr = 0;
     optind = 0;  // from the start, also the second time
     *request = PLIANT_PLAY_RUN;
     for (int found; (found = getopt_long(argc, argv, ":o:qh", long_options, NULL)) != -1;) {
-        if (found == '?' || found == ':') return pliant_option_refuse(found, argc, argv, long_options, err);
+        if (found == '?' || found == ':')
+            return pliant_option_refuse(found, argc, argv, long_options, err);
         if (found == 'h' || found == OPTION_VERSION) {
             *request = found == 'h' ? PLIANT_PLAY_HELP : PLIANT_PLAY_VERSION;
             return PLIANT_OK;

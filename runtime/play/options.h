@@ -9,7 +9,8 @@ typedef struct pliant_play_options {
     const char *csv, *frames, *vtk, *compare;  // NULL: not asked for
     int32_t level;                             // of --lod, -1: all
     int32_t repeat, threads;
-    int force, quiet, json, verify;
+    int32_t deadline_us;  // -1: none
+    int force, quiet, json, verify, passive;
 } pliant_play_options;  // strings are argv's
 
 typedef enum pliant_play_request {
@@ -23,4 +24,4 @@ PLIANT_UNUSED_RESULT pliant_status pliant_play_options_parse(int argc, char **ar
                                                              pliant_play_options *options,
                                                              pliant_play_request *request,
                                                              pliant_error *err);
-extern const char pliant_play_help[];  // the text of --help
+extern const char *const pliant_play_help[];  // the text of --help in parts, then NULL

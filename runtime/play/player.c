@@ -1,6 +1,8 @@
 // player.c: executes the statements of a contact script against one solver.
 #include "player.h"
 
+#include "address.h"
+
 #include "pliant/error.h"
 
 #include <math.h>
@@ -8,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 struct pliant_player {
     const pliant_model *model;
@@ -74,15 +75,14 @@ static pliant_status explain(const pliant_player *player, const pliant_statement
                              pliant_node node, pliant_status status, pliant_error *err)
 {
     const char *verb = verb_of(statement->kind);
+    pliant_error reason = {""};
     switch (status) {
     case PLIANT_ERR_MISSING:
         if (statement->kind == PLIANT_STATEMENT_GRAVITY)
             return refuse(player, statement, err, status,
                           "gravity needs /body/gravity, which the model does not have");
-        if (node.level < player->finest)
-            return refuse(player, statement, err, status,
-                          "level %d is not in the file: expected constraints on level %d",
-                          (int)node.level, (int)player->finest);
+        if (!pliant_address_is_stored(player->model, node.level, &reason))
+            return refuse(player, statement, err, status, "%s", reason.text);
         return refuse(player, statement, err, status,
                       "%s at the fixed vertex %d needs a model precomputed with --blocks all", verb,
                       (int)node.vertex);
@@ -107,6 +107,8 @@ pliant_player_def pliant_player_default(const pliant_model *model)
         .script_name = "script",
         .level = pliant_model_describe(model).level_count - 1,
         .probe_rule = PLIANT_PROBES_ANYTIME,
+        .deadline_ns = PLIANT_NEVER,
+        .compliance = PLIANT_COMPLIANCE_STORED,
     };
 }
 
@@ -130,7 +132,8 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
     if (!p->surface)
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player of %d vertices",
                                   (int)info.vertex_count);
-    if (status == PLIANT_OK) status = pliant_conditions_create(model, &p->conditions, err);
+    if (status == PLIANT_OK)
+        status = pliant_conditions_create(model, def->compliance, &p->conditions, err);
     if (status < 0) {
         pliant_player_destroy(p);
         return status;
@@ -154,42 +157,12 @@ void pliant_player_destroy(pliant_player *player)
 
 // The model's vertex or basis function that a statement names.
 static pliant_status resolve(const pliant_player *player, const pliant_statement *statement,
-                             pliant_node *node, pliant_error *err)
+                             pliant_address_use use, pliant_node *node, pliant_error *err)
 {
-    const pliant_vertex_name *name = &statement->vertex;
-    *node = (pliant_node){player->finest, name->number};
-    switch (name->kind) {
-    case PLIANT_VERTEX_MODEL:
-        if (name->number < 0 || name->number >= player->info.vertex_count)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "vertex %d of %d",
-                          (int)name->number, (int)player->info.vertex_count);
-        return PLIANT_OK;
-    case PLIANT_VERTEX_LEVEL:
-        if (name->level < 0 || name->level > player->finest)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "level %d: expected 0 to %d",
-                          (int)name->level, (int)player->finest);
-        node->level = name->level;
-        const int32_t count = pliant_model_level_vertex_count(player->model, name->level);
-        if (name->number < 0 || name->number >= count)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "vertex %d of %d on level %d", (int)name->number, (int)count,
-                          (int)name->level);
-        return PLIANT_OK;
-    case PLIANT_VERTEX_SOURCE:
-        node->vertex = pliant_model_from_source(player->model, name->number);
-        if (node->vertex < 0)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "source vertex %d is not in the model", (int)name->number);
-        return PLIANT_OK;
-    case PLIANT_VERTEX_NEAR:
-        node->vertex = pliant_model_nearest(player->model, name->position);
-        if (node->vertex < 0)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "the model has no free vertex");
-        return PLIANT_OK;
-    default:
-        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "expected a vertex");
-    }
+    pliant_error reason = {""};
+    const pliant_status status =
+        pliant_address_resolve(player->model, &statement->vertex, use, node, &reason);
+    return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
 }
 
 // The statement's vector times `scale`, in single precision.
@@ -213,7 +186,7 @@ static pliant_status execute_condition(pliant_player *player, const pliant_state
                                        pliant_error *err)
 {
     pliant_condition condition = {.kind = PLIANT_CONDITION_PRESSED};
-    pliant_status status = resolve(player, statement, &condition.node, err);
+    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_NODE, &condition.node, err);
     if (status < 0) return status;
     const int32_t vertex = condition.node.vertex;
     const int is_free = pliant_model_is_free(player->model, vertex) == 1;
@@ -233,9 +206,12 @@ static pliant_status execute_condition(pliant_player *player, const pliant_state
                           (int)vertex);
         condition.kind = PLIANT_CONDITION_SUPPORTED;
         break;
-    case PLIANT_STATEMENT_FORCE:
-        scale = 1 / pliant_model_area(player->model, vertex);  // f_i = a_i p_i (GF-4)
+    case PLIANT_STATEMENT_FORCE: {
+        // f = a p (GF-4), a the area of the hat. No columns, no area: the solver refuses.
+        const double area = pliant_model_node_area(player->model, condition.node);
+        if (area > 0) scale = 1 / area;
         break;
+    }
     default:
         break;
     }
@@ -265,9 +241,9 @@ static pliant_status execute_release(pliant_player *player, const pliant_stateme
         return PLIANT_OK;
     }
     pliant_node node;
-    pliant_status status = resolve(player, statement, &node, err);
+    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_NODE, &node, err);
     if (status < 0) return status;
-    status = pliant_conditions_drop(player->conditions, node);
+    status = pliant_conditions_drop(player->conditions, node.vertex);
     return status < 0 ? explain(player, statement, node, status, err) : PLIANT_OK;
 }
 
@@ -308,7 +284,7 @@ static pliant_status execute_probe(pliant_player *player, const pliant_statement
         return refuse(player, statement, err, PLIANT_ERR_CAPACITY, "more than %d probes",
                       PLIANT_PROBE_LIMIT);
     pliant_node node;
-    pliant_status status = resolve(player, statement, &node, err);
+    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_VERTEX, &node, err);
     if (status < 0) return status;
     status = reserve_probe(player);
     if (status < 0) return refuse(player, statement, err, status, "no memory for another probe");
@@ -372,13 +348,6 @@ static pliant_status execute_dt(pliant_player *player, const pliant_statement *s
 
 // ---- Steps ----
 
-static int64_t now_ns(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-
 // A surface reconstructed to a coarser level holds that level's smoothed values (lifting moves
 // them), so probes are then evaluated selectively: what they say does not depend on the level.
 static pliant_status read_probes(pliant_player *player)
@@ -401,12 +370,13 @@ static pliant_status read_probes(pliant_player *player)
 static pliant_status step_once(pliant_player *player, const pliant_statement *statement,
                                pliant_error *err)
 {
-    const int64_t start = now_ns();
-    const pliant_status solved = pliant_conditions_solve(player->conditions);
     pliant_solver *solver = pliant_conditions_solver(player->conditions);
+    const int64_t start = pliant_clock_ns(), given = player->def.deadline_ns;
+    const pliant_status solved =
+        pliant_solver_solve(solver, given < PLIANT_NEVER - start ? start + given : PLIANT_NEVER);
     pliant_status status = solved;
     if (solved >= 0) status = pliant_solver_surface(solver, player->def.level, player->surface);
-    const int64_t end = now_ns();
+    const int64_t end = pliant_clock_ns();
     if (status < 0)
         return refuse(player, statement, err, status, "step %lld with %d constraints: %s",
                       (long long)player->last.number + 1,

@@ -25,6 +25,8 @@ typedef struct pliant_player_def {
     const char *script_name;       // for messages; borrowed until destroy
     int32_t level;                 // the surface is reconstructed up to this level; default all
     pliant_probe_rule probe_rule;  // default anytime
+    int64_t deadline_ns;           // what every solve is given; default PLIANT_NEVER
+    pliant_compliance compliance;  // default as stored
 } pliant_player_def;
 
 typedef struct pliant_probe {
@@ -38,7 +40,7 @@ typedef struct pliant_probe {
 typedef struct pliant_step {
     int64_t number;        // 1 is the first
     double time;           // s, at the end of the step
-    pliant_status status;  // of the solve: PLIANT_OK or a reduced result
+    pliant_status status;  // of the solve: PLIANT_OK or a reduced result (the report tells more)
     int64_t total_ns;      // solve and surface together
     pliant_solver_report report;
     pliant_vec3 force;  // total contact force, N

@@ -15,6 +15,23 @@ static void write_timings(const pliant_timings *timings, FILE *stream)
     }
 }
 
+static void write_deadline(const pliant_report *report, FILE *stream)
+{
+    // Of warm-up, too: a miss is a miss.
+    pliant_punctuality p = report->result->timings->punctuality;
+    pliant_punctuality_merge(&p, &report->result->warm_up->punctuality);
+    fprintf(stream,
+            "deadline %.9g us: %lld of %lld steps missed it: %lld solved on a coarser level, %lld "
+            "solved too late, worst lateness %.1f us\n",
+            1e-3 * (double)report->deadline_ns, (long long)p.missed_count, (long long)p.step_count,
+            (long long)p.coarser_count, (long long)p.overrun_count,
+            1e-3 * (double)p.worst_lateness_ns);
+    fprintf(stream, "steps by constraint level:");
+    for (int l = 0; l < report->info->level_count; l++)
+        fprintf(stream, "%s %lld on %d", l ? "," : "", (long long)p.level_counts[l], l);
+    fprintf(stream, "\n");
+}
+
 static void write_probes(const pliant_player *player, FILE *stream)
 {
     int32_t count;
@@ -77,6 +94,7 @@ void pliant_report_write(const pliant_report *report, FILE *stream)
                 1e-3 * pliant_histogram_percentile(h, 0.99),
                 1e-3 * pliant_histogram_percentile(h, 1));
     }
+    if (report->deadline_ns < PLIANT_NEVER) write_deadline(report, stream);
     fprintf(stream, "\n");
     write_probes(player, stream);
     if (report->compare) {
@@ -95,8 +113,11 @@ void pliant_report_write_step(const pliant_player *player, const pliant_step *st
     for (int32_t i = 0; i < count; i++)
         fprintf(stream, " %s %.6g %.6g %.6g", probes[i].name, (double)probes[i].u.x,
                 (double)probes[i].u.y, (double)probes[i].u.z);
-    fprintf(stream, " force %.6g %.6g %.6g\n", (double)step->force.x, (double)step->force.y,
+    fprintf(stream, " force %.6g %.6g %.6g", (double)step->force.x, (double)step->force.y,
             (double)step->force.z);
+    if (step->report.is_late || step->report.lateness_ns > 0)
+        fprintf(stream, " late %.1f", 1e-3 * (double)step->report.lateness_ns);
+    fprintf(stream, "\n");
 }
 
 void pliant_report_write_expectation(const pliant_expectation *expectation, FILE *stream)

@@ -52,6 +52,24 @@ static void put_phases(const pliant_timings *timings, FILE *stream)
     fputc('}', stream);
 }
 
+static void put_punctuality(const pliant_report *report, FILE *stream)
+{
+    // Of warm-up, too: a miss is a miss.
+    pliant_punctuality p = report->result->timings->punctuality;
+    pliant_punctuality_merge(&p, &report->result->warm_up->punctuality);
+    fputs(",\"level_steps\":[", stream);
+    for (int l = 0; l < report->info->level_count; l++)
+        fprintf(stream, "%s%lld", l ? "," : "", (long long)p.level_counts[l]);
+    fputc(']', stream);
+    if (report->deadline_ns == PLIANT_NEVER) return;
+    fprintf(stream,
+            ",\"deadline\":{\"us\":%.9g,\"misses\":%lld,\"coarser\":%lld,\"overruns\":%lld,"
+            "\"worst_lateness_us\":%.3f}",
+            1e-3 * (double)report->deadline_ns, (long long)p.missed_count,
+            (long long)p.coarser_count, (long long)p.overrun_count,
+            1e-3 * (double)p.worst_lateness_ns);
+}
+
 static void put_worst(const char *name, double value, int64_t step, FILE *stream)
 {
     fprintf(stream, ",\"%s\":", name);
@@ -107,6 +125,7 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
     }
     fputs("},\"force\":", stream);
     put_vec3(pliant_player_last(player)->force, stream);
+    put_punctuality(report, stream);
     if (report->compare) {
         fputs(",\"compare\":", stream);
         put_compare(report->compare, stream);
@@ -120,11 +139,13 @@ void pliant_report_write_step_json(const pliant_player *player, const pliant_ste
     const pliant_solver_report *r = &step->report;
     fprintf(stream,
             "{\"step\":%lld,\"time\":%.12g,\"solve_us\":%.3f,\"constraints\":%d,\"level\":%d,"
-            "\"rough\":%s,\"us\":{\"capacitance\":%.3f,\"contact\":%.3f,\"summation\":%.3f,"
+            "\"rough\":%s,\"late\":%s,\"lateness_us\":%.3f,\"us\":{\"capacitance\":%.3f,"
+            "\"contact\":%.3f,\"summation\":%.3f,"
             "\"surface\":%.3f,\"total\":%.3f},\"probes\":{",
             (long long)step->number, step->time, 1e-3 * (double)step->total_ns,
             (int)r->constraint_count, (int)r->level,
-            step->status == PLIANT_ROUGH ? "true" : "false", 1e-3 * (double)r->capacitance_ns,
+            step->status == PLIANT_ROUGH ? "true" : "false", r->is_late ? "true" : "false",
+            1e-3 * (double)r->lateness_ns, 1e-3 * (double)r->capacitance_ns,
             1e-3 * (double)r->contact_ns, 1e-3 * (double)r->summation_ns,
             1e-3 * (double)r->surface_ns, 1e-3 * (double)step->total_ns);
     int32_t count;

@@ -14,6 +14,32 @@ const char *pliant_phase_name(pliant_phase phase)
     return phase_names[phase];
 }
 
+static void add_punctuality(pliant_punctuality *punctuality, const pliant_solver_report *report)
+{
+    // Of the solve's status too much is left out: a rough solve may be late as well.
+    const int is_coarser = report->is_late != 0, is_overrun = report->lateness_ns > 0;
+    punctuality->step_count++;
+    punctuality->missed_count += is_coarser || is_overrun;
+    punctuality->coarser_count += is_coarser;
+    punctuality->overrun_count += is_overrun;
+    if (report->lateness_ns > punctuality->worst_lateness_ns)
+        punctuality->worst_lateness_ns = report->lateness_ns;
+    if (report->level >= 0 && report->level <= PLIANT_LEVEL_LIMIT)
+        punctuality->level_counts[report->level]++;
+}
+
+void pliant_punctuality_merge(pliant_punctuality *punctuality, const pliant_punctuality *other)
+{
+    punctuality->step_count += other->step_count;
+    punctuality->missed_count += other->missed_count;
+    punctuality->coarser_count += other->coarser_count;
+    punctuality->overrun_count += other->overrun_count;
+    if (other->worst_lateness_ns > punctuality->worst_lateness_ns)
+        punctuality->worst_lateness_ns = other->worst_lateness_ns;
+    for (int l = 0; l <= PLIANT_LEVEL_LIMIT; l++)
+        punctuality->level_counts[l] += other->level_counts[l];
+}
+
 void pliant_timings_add(pliant_timings *timings, const pliant_step *step)
 {
     const pliant_solver_report *report = &step->report;
@@ -22,6 +48,7 @@ void pliant_timings_add(pliant_timings *timings, const pliant_step *step)
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_SUMMATION], report->summation_ns);
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_SURFACE], report->surface_ns);
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_TOTAL], step->total_ns);
+    add_punctuality(&timings->punctuality, report);
     if (step->status == PLIANT_ROUGH) timings->rough_count++;
     if (report->constraint_count > timings->most_constraints)
         timings->most_constraints = report->constraint_count;
@@ -31,6 +58,7 @@ void pliant_timings_merge(pliant_timings *timings, const pliant_timings *other)
 {
     for (int p = 0; p < PLIANT_PHASE_COUNT; p++)
         pliant_histogram_merge(&timings->phases[p], &other->phases[p]);
+    pliant_punctuality_merge(&timings->punctuality, &other->punctuality);
     timings->rough_count += other->rough_count;
     if (other->most_constraints > timings->most_constraints)
         timings->most_constraints = other->most_constraints;

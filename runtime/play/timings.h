@@ -4,6 +4,8 @@
 #include "histogram.h"
 #include "player.h"
 
+#include "pliant/hierarchy.h"
+
 typedef enum pliant_phase {
     PLIANT_PHASE_CAPACITANCE,  // assembling and factoring C
     PLIANT_PHASE_CONTACT,      // selective reconstruction and C^-1
@@ -13,8 +15,19 @@ typedef enum pliant_phase {
     PLIANT_PHASE_COUNT,
 } pliant_phase;
 
+// How steps kept their deadline, and on which levels they were solved.
+typedef struct pliant_punctuality {
+    int64_t step_count;
+    int64_t missed_count;       // steps that missed their deadline, in one of the next two ways
+    int64_t coarser_count;      // solved on a coarser level than stated
+    int64_t overrun_count;      // solved, on whatever level, after the deadline
+    int64_t worst_lateness_ns;  // of those
+    int64_t level_counts[PLIANT_LEVEL_LIMIT + 1];  // steps by the finest level of their constraints
+} pliant_punctuality;                              // zeroed is empty
+
 typedef struct pliant_timings {
     pliant_histogram phases[PLIANT_PHASE_COUNT];
+    pliant_punctuality punctuality;
     int64_t rough_count;       // steps that solved with PLIANT_ROUGH
     int32_t most_constraints;  // the largest s
 } pliant_timings;              // zeroed is empty; about 300 kB
@@ -22,3 +35,4 @@ typedef struct pliant_timings {
 const char *pliant_phase_name(pliant_phase phase);  // static
 void pliant_timings_add(pliant_timings *timings, const pliant_step *step);
 void pliant_timings_merge(pliant_timings *timings, const pliant_timings *other);
+void pliant_punctuality_merge(pliant_punctuality *punctuality, const pliant_punctuality *other);

@@ -70,7 +70,8 @@ static void every_statement_is_understood(void **state)
     check_near(s.value[2], -0.02, 0);
     assert_int_equal(s.column, 10);
     s = parse("displace 1:17 0 0 .5#glued");
-    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_LEVEL);
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_MODEL);
+    assert_int_equal(s.vertex.has_level, 1);
     assert_int_equal(s.vertex.level, 1);
     assert_int_equal(s.vertex.number, 17);
     check_near(s.value[2], 0.5, 0);
@@ -81,6 +82,17 @@ static void every_statement_is_understood(void **state)
     s = parse("force source 2147483647 1 1. 1E0");
     assert_int_equal(s.kind, PLIANT_STATEMENT_FORCE);
     assert_int_equal(s.vertex.number, INT32_MAX);
+    assert_int_equal(s.vertex.has_level, 0);
+    s = parse("support 0:source 30 0 0 0.01");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_SOURCE);
+    assert_int_equal(s.vertex.has_level, 1);
+    assert_int_equal(s.vertex.level, 0);
+    assert_int_equal(s.vertex.number, 30);
+    s = parse("release 2147483647:near 0.1 0.2 0.3");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_NEAR);
+    assert_int_equal(s.vertex.has_level, 1);
+    assert_int_equal(s.vertex.level, INT32_MAX);
+    check_near(s.vertex.position[0], 0.1, 0);
     assert_int_equal(parse("support 30 0 0 0.01").kind, PLIANT_STATEMENT_SUPPORT);
     s = parse("gravity 0 0 -9.81");
     assert_int_equal(s.kind, PLIANT_STATEMENT_GRAVITY);
@@ -103,13 +115,21 @@ static void mistakes_are_placed_and_explained(void **state)
     check_refused("shove 1 2 3", "s:7:1: expected probe, displace, traction, force, support, gravity, "
                                  "release, dt, step or expect, found \"shove\"");
     check_refused("pliant-script 1", "s:7:1: expected pliant-script as first statement only, found \"pliant-script\"");
-    check_refused("displace", "s:7:9: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
-    check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"-1\"");
-    check_refused("displace 2147483648 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"2147483648\"");
-    check_refused("displace 1: 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"1:\"");
-    check_refused("displace 1:2:3 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"1:2:3\"");
-    check_refused("displace :2 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \":2\"");
-    check_refused("displace 12a 0 0 0", "s:7:10: expected a vertex: K, L:K, source K or near X Y Z, found \"12a\"");
+    check_refused("displace", "s:7:9: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
+    check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"-1\"");
+    check_refused("displace 2147483648 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"2147483648\"");
+    check_refused("displace 1: 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:\"");
+    check_refused("displace 1:2:3 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:2:3\"");
+    check_refused("displace :2 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \":2\"");
+    check_refused("displace 12a 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"12a\"");
+    check_refused("displace 1:source:3 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:source:3\"");
+    check_refused("displace 1:2:near 0 0 0 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:2:near\"");
+    check_refused("displace 2147483648:near 0 0 0 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"2147483648:near\"");
+    check_refused("displace -1:near 0 0 0 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"-1:near\"");
+    check_refused("displace 1: near 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:\"");
+    check_refused("displace 1:near 0 0", "s:7:20: expected z, a number, found the end of the line");
+    check_refused("displace 1:source x 0 0 0", "s:7:19: expected the number of a vertex of the input mesh, found \"x\"");
+    check_refused("release 1:all", "s:7:9: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"1:all\"");
     check_refused("displace source 0 0", "s:7:20: expected y, a number, found the end of the line");
     check_refused("displace source x 0 0", "s:7:17: expected the number of a vertex of the input mesh, found \"x\"");
     check_refused("displace 8 0 nan 0", "s:7:14: expected y, a number, found \"nan\"");
@@ -123,7 +143,7 @@ static void mistakes_are_placed_and_explained(void **state)
     check_refused("displace 8 0 -3.5e38 0", "s:7:14: expected a number within +-3.4e38, found \"-3.5e38\"");
     check_refused("displace 8 0 0 0 0", "s:7:18: expected the end of the line, found \"0\"");
     check_refused("gravity 0 0 1 please", "s:7:15: expected the end of the line, found \"please\"");
-    check_refused("release", "s:7:8: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
+    check_refused("release", "s:7:8: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
     check_refused("release all 3", "s:7:13: expected the end of the line, found \"3\"");
     check_refused("step 0", "s:7:6: expected a number of steps, 1 or more, found \"0\"");
     check_refused("step -3", "s:7:6: expected a number of steps, 1 or more, found \"-3\"");
@@ -135,8 +155,9 @@ static void mistakes_are_placed_and_explained(void **state)
     check_refused("expect nose 0 0 0 -1", "s:7:19: expected a tolerance, a number >= 0, found \"-1\"");
     check_refused("probe", "s:7:6: expected a probe's name of letters, digits, _ - ., found the end of the line");
     check_refused("probe a,b vertex 1", "s:7:7: expected a probe's name of letters, digits, _ - ., found \"a,b\"");
+    check_refused("probe nose 1:near 0 0 0", "s:7:12: expected vertex or near, found \"1:near\"");
     check_refused("probe nose 812", "s:7:12: expected vertex or near, found \"812\"");
-    check_refused("probe nose vertex", "s:7:18: expected a vertex: K, L:K, source K or near X Y Z, found the end of the line");
+    check_refused("probe nose vertex", "s:7:18: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
 }
 
 static void columns_count_characters_not_bytes(void **state)

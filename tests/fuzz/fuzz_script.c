@@ -22,6 +22,7 @@ static const char *const seeds[] = {
     "100\r\n",
     "\xef\xbb\xbfpliant-script 1\nforce near 1 2 3 0 0 -3\nsupport 30 0 0 0.01\ngravity 0 0 "
     "-9.81\ndt 1e-3\n",
+    "pliant-script 1\ndisplace 1:near 0 1 2 0 0 1\nprobe p vertex 0:source 7\nrelease 2:5\n",
     "pliant-script 1\nrelease 812\nrelease all\nexpect nose 0 0 -0.02 1e-3\n\n# \xc3\xa4\n",
     "pliant-script 2\n",
     "step x\nrelease\ndt -1\nexpect a,b\ngravity nan inf 1e999\n",
@@ -50,6 +51,7 @@ static void check_statement(const pliant_statement *s)
         if (!isfinite(s->value[d]) || !isfinite(s->vertex.position[d])) abort();
     if (!isfinite(s->scalar) || s->column < 1 || s->vertex.number < 0 || s->vertex.level < 0)
         abort();
+    if (!s->vertex.has_level && s->vertex.level != 0) abort();
     if (!memchr(s->name, 0, sizeof s->name)) abort();
     if ((s->kind == PLIANT_STATEMENT_STEP || s->kind == PLIANT_STATEMENT_VERSION) && s->count < 1)
         abort();

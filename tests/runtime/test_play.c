@@ -124,12 +124,14 @@ static int set_up(void **state)
     strcpy(folder, "/tmp/pliant-play-XXXXXX");
     if (!mkdtemp(folder)) return -1;
     const pliant_wavelet_def wavelet = pliant_wavelet_default();
-    // 162 vertices, nothing thresholded; and 42 for what takes many steps.
-    check_write_synthetic_model(in_folder("model.h5"), in_folder("dense.h5"), 2, 0, wavelet,
-                                CHECK_ALL_BLOCKS);
-    check_write_synthetic_model(in_folder("free.h5"), in_folder("free-dense.h5"), 2, 0.2, wavelet,
-                                CHECK_FREE_BLOCK);
-    check_write_synthetic_model(in_folder("tiny.h5"), NULL, 1, 0, wavelet, CHECK_FREE_BLOCK);
+    // All levels; 162 vertices, nothing thresholded; and 42 for what takes many steps.
+    check_write_synthetic_levels(in_folder("model.h5"), in_folder("dense.h5"), 2, 0, wavelet,
+                                 CHECK_ALL_BLOCKS);
+    check_write_synthetic_levels(in_folder("free.h5"), in_folder("free-dense.h5"), 2, 0.2, wavelet,
+                                 CHECK_FREE_BLOCK);
+    check_write_synthetic_levels(in_folder("tiny.h5"), NULL, 1, 0, wavelet, CHECK_FREE_BLOCK);
+    // Compressed beyond what contact bears.
+    check_write_synthetic_levels(in_folder("rough.h5"), NULL, 2, 1, wavelet, CHECK_FREE_BLOCK);
     write_text("poke.script", poke);
     return 0;
 }
@@ -152,6 +154,7 @@ static void help_and_version_go_to_standard_output(void **state)
     check_run(0, "$P -h");
     const char *const options[] = {"-o, --output", "--frames",    "--vtk",       "--force",
                                    "--lod",        "--repeat",    "--threads",   "--compare",
+                                   "--deadline-us", "--passive",
                                    "--json",       "--no-verify", "-q, --quiet", "--help",
                                    "--version",    "example:"};
     for (size_t i = 0; i < sizeof options / sizeof *options; i++) check_contains(out, options[i]);
@@ -174,7 +177,14 @@ static void misuse_is_told_and_ends_with_status_2(void **state)
     } cases[] = {
         {"", "expected MODEL.h5 [SCRIPT], found nothing; see --help"},
         {"a b c", "expected MODEL.h5 [SCRIPT], found 'c' too; see --help"},
-        {"--deadline-us 1000 model.h5", "--deadline-us: unknown option; see --help"},
+        {"--lode 1 model.h5", "--lode: unknown option; see --help"},
+        {"--deadline-us x model.h5",
+         "--deadline-us: expected a whole number from 0 to 1000000000, found 'x'"},
+        {"--deadline-us -1 model.h5",
+         "--deadline-us: expected a whole number from 0 to 1000000000, found '-1'"},
+        {"--deadline-us 1000000001 model.h5",
+         "--deadline-us: expected a whole number from 0 to 1000000000, found '1000000001'"},
+        {"--passive=no model.h5", "--passive: expected no value, found --passive=no"},
         {"-z model.h5", "-z: unknown option; see --help"},
         {"--lod", "--lod: expected a value, found nothing"},
         {"-o", "-o: expected a value, found nothing"},
@@ -747,6 +757,86 @@ static void repeats_and_threads_play_the_same_and_count_all(void **state)
     check_run(0, "rm many.csv one.csv many.txt");
 }
 
+static void missed_deadlines_are_told_and_are_no_failure(void **state)
+{
+    (void)state;
+    FILE *script = fopen(in_folder("many.script"), "w");
+    assert_non_null(script);
+    fputs("pliant-script 1\nprobe p near 0 0 1\nstep\n", script);
+    // A patch on top of the body; an icosahedron's vertex is its middle, held on every level.
+    for (int i = 0; i < 20; i++)
+        fprintf(script, "displace near %g %g 1 0 0 -0.1\n", 0.2 * (i % 5 - 2), 0.2 * (i / 5 - 2));
+    fputs("step 3\nrelease all\nstep 2\n", script);
+    assert_int_equal(fclose(script), 0);
+    // Zero microseconds: no step can be in time.
+    check_run(0, "$P --deadline-us 0 -o late.csv model.h5 many.script");
+    assert_string_equal(err, "");
+    const char *line = strstr(out, "\ndeadline 0 us: ");
+    assert_non_null(line);
+    int missed, of, coarser, overrun, on[3];
+    double worst;
+    assert_int_equal(sscanf(line, " deadline 0 us: %d of %d steps missed it: %d solved on a coarser "
+                                  "level, %d solved too late, worst lateness %lf us",
+                            &missed, &of, &coarser, &overrun, &worst),
+                     5);
+    assert_int_equal(of, 6);
+    assert_int_equal(missed, 6);
+    assert_int_equal(coarser, 3);
+    assert_int_equal(overrun, 6);
+    check_at_least(worst, 0.01);
+    assert_int_equal(sscanf(strstr(line, "\nsteps by"),
+                            " steps by constraint level: %d on 0, %d on 1, %d on 2", &on[0], &on[1],
+                            &on[2]),
+                     3);
+    assert_int_equal(on[0] + on[1] + on[2], 6);
+    assert_int_equal(on[2], 3);  // without constraints: the finest level
+    // The levels of the steps stand in the table.
+    check_run(0, "cut -d, -f1,5 late.csv; rm late.csv");
+    int levels[6];
+    assert_int_equal(sscanf(out, "step,level 1,%d 2,%d 3,%d 4,%d 5,%d 6,%d", &levels[0], &levels[1],
+                            &levels[2], &levels[3], &levels[4], &levels[5]),
+                     6);
+    for (int i = 0; i < 6; i++) assert_int_equal(levels[i] < 2, i >= 1 && i <= 3);
+
+    check_run(0, "$P --json --deadline-us 0 model.h5 many.script");
+    check_contains(out, "\"deadline\":{\"us\":0,\"misses\":6,\"coarser\":3,\"overruns\":6,"
+                        "\"worst_lateness_us\":");
+    check_contains(out, ",\"level_steps\":[");
+    check_run(0, "$P --json --deadline-us 0 model.h5 <many.script");
+    check_contains(out, "\"late\":true,\"lateness_us\":");
+    check_run(0, "$P --deadline-us 0 model.h5 <many.script");
+    check_contains(out, " late ");
+    // An hour is enough for anybody, and without a deadline none is missed.
+    check_run(0, "$P --deadline-us 1000000000 model.h5 many.script");
+    check_contains(out, "\ndeadline 1e+09 us: 0 of 6 steps missed it: 0 solved on a coarser level, 0 "
+                        "solved too late, worst lateness 0.0 us\n"
+                        "steps by constraint level: 0 on 0, 0 on 1, 6 on 2\n");
+    check_run(0, "$P model.h5 many.script");
+    assert_null(strstr(out, "deadline"));
+    // Every pass counts, the first ones too.
+    check_run(0, "$P --repeat 3 --threads 2 --deadline-us 0 model.h5 many.script");
+    check_contains(out, "\ndeadline 0 us: 36 of 36 steps missed it: 18 solved on a coarser level, ");
+    check_run(0, "rm many.script");
+}
+
+static void passive_contact_is_never_rough(void **state)
+{
+    (void)state;
+    // Compressed until the stored compliance of a large patch is not definite any more.
+    FILE *script = fopen(in_folder("dense.script"), "w");
+    assert_non_null(script);
+    fputs("pliant-script 1\n", script);
+    for (int i = 0; i < 60; i++) fprintf(script, "displace near %g %g %g 0 0 -0.1\n",
+                                         0.15 * (i % 8 - 4), 0.15 * (i / 8 - 4), 0.8);
+    fputs("step\n", script);
+    assert_int_equal(fclose(script), 0);
+    check_run(0, "$P --json rough.h5 dense.script");
+    check_contains(out, "\"rough_steps\":1,");
+    check_run(0, "$P --passive --json rough.h5 dense.script");
+    check_contains(out, "\"rough_steps\":0,");
+    check_run(0, "rm dense.script");
+}
+
 static void outputs_that_cannot_be_written_are_told(void **state)
 {
     (void)state;
@@ -815,6 +905,8 @@ int main(void)
         cmocka_unit_test(vtk_series_opens),
         cmocka_unit_test(comparison_with_the_dense_file_is_float_accurate),
         cmocka_unit_test(repeats_and_threads_play_the_same_and_count_all),
+        cmocka_unit_test(missed_deadlines_are_told_and_are_no_failure),
+        cmocka_unit_test(passive_contact_is_never_rough),
         cmocka_unit_test(outputs_that_cannot_be_written_are_told),
         cmocka_unit_test(a_full_disk_leaves_nothing_under_the_names),
     };

@@ -4,6 +4,7 @@
 #include "pliant/error.h"
 #include "player.h"
 #include "synthetic_model.h"
+#include "timings.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -40,16 +41,25 @@ void *realloc(void *block, size_t size)
 // ---- Models, made once ----
 
 static char folder[64];
-static pliant_model *whole;  // 162 vertices, all blocks, nothing thresholded
-static pliant_model *loose;  // 642 vertices, free block only, eps 0.05
+static pliant_model *whole;   // 162 vertices, all levels and blocks, nothing thresholded
+static pliant_model *loose;   // 642 vertices, all levels, free block only, eps 0.05
+static pliant_model *fine;    // 162 vertices, columns of level 2 alone, free block only
+static pliant_model *coarse;  // 162 vertices, columns of levels 0 and 1, free block only
 
-static pliant_model *make(const char *name, int32_t levels, double eps, check_blocks blocks)
+static pliant_model *make(int32_t levels, uint32_t level_mask, double eps, check_blocks blocks)
 {
     char path[128];
     pliant_error err;
     pliant_model *model;
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    check_write_synthetic_model(path, NULL, levels, eps, pliant_wavelet_default(), blocks);
+    snprintf(path, sizeof path, "%s/model.h5", folder);
+    check_synthetic *s =
+        check_synthetic_create(&(check_synthetic_def){.levels = levels,
+                                                      .eps = eps,
+                                                      .wavelet = pliant_wavelet_default(),
+                                                      .blocks = blocks,
+                                                      .level_mask = level_mask});
+    check_synthetic_write(s, path);
+    check_synthetic_destroy(s);
     check_ok(pliant_model_open(path, &model, &err), &err);
     unlink(path);
     return model;
@@ -60,8 +70,10 @@ static int set_up(void **state)
     (void)state;
     strcpy(folder, "/tmp/pliant-player-XXXXXX");
     if (!mkdtemp(folder)) return -1;
-    whole = make("whole.h5", 2, 0, CHECK_ALL_BLOCKS);
-    loose = make("loose.h5", 3, 0.05, CHECK_FREE_BLOCK);
+    whole = make(2, 7, 0, CHECK_ALL_BLOCKS);
+    loose = make(3, 15, 0.05, CHECK_FREE_BLOCK);
+    fine = make(2, 4, 0, CHECK_FREE_BLOCK);
+    coarse = make(2, 3, 0, CHECK_FREE_BLOCK);
     return 0;
 }
 
@@ -70,6 +82,8 @@ static int tear_down(void **state)
     (void)state;
     pliant_model_close(whole);
     pliant_model_close(loose);
+    pliant_model_close(fine);
+    pliant_model_close(coarse);
     return rmdir(folder);
 }
 
@@ -251,6 +265,252 @@ static void force_is_traction_times_vertex_area(void **state)
     pliant_player_destroy(traction);
 }
 
+// The hat of a node at all vertices, by the definition (GF-53): one at its vertex, the mean of the
+// parents at vertices of finer levels, which the traction of a free node shows: the load of the hat
+// is the sum of the loads at its vertices (GF-60).
+static void a_load_on_a_level_is_the_sum_of_loads_over_its_hat(void **state)
+{
+    (void)state;
+    const int32_t k = free_vertex(whole, 3), n = pliant_model_describe(whole).vertex_count;
+    assert_in_range(k, 0, 11);
+    for (int32_t level = 0; level < 3; level++) {
+        pliant_player *hat = create(whole), *sum = create(whole);
+        play_ok(hat, "traction %d:%d 1 2 3\nstep\n", (int)level, (int)k);
+        double values[162] = {0}, area = 0;
+        assert_int_equal(n, 162);
+        values[k] = 1;
+        for (int32_t l = level; l < 2; l++) {
+            const int32_t *face = pliant_model_faces(whole, l),
+                          *child = pliant_model_faces(whole, l + 1);
+            for (int32_t f = 0; f < pliant_model_level_face_count(whole, l); f++)
+                for (int c = 0; c < 3; c++) {
+                    const int32_t a = face[3 * f + c], b = face[3 * f + (c + 1) % 3];
+                    const int32_t m = child[12 * f + (const int[]){1, 4, 2}[c]];
+                    if (pliant_model_is_free(whole, m)) values[m] = (values[a] + values[b]) / 2;
+                }
+        }
+        for (int32_t v = 0; v < n; v++) {
+            area += values[v] * pliant_model_area(whole, v);
+            if (values[v] != 0)
+                play_ok(sum, "traction %d %.17g %.17g %.17g\n", (int)v, values[v], 2 * values[v],
+                        3 * values[v]);
+        }
+        play_ok(sum, "step\n");
+        // A sum of up to 61 columns of floats against one of their sum.
+        double largest = 0;
+        for (int32_t v = 0; v < n; v++) largest = fmax(largest, fabs((double)at(sum, v).z));
+        for (int32_t v = 0; v < n; v++) check_near(at(hat, v).z, at(sum, v).z, 1e-5 * largest);
+        // And force is traction times the hat's area.
+        pliant_player *force = create(whole);
+        play_ok(force, "force %d:%d %.17g %.17g %.17g\nstep\n", (int)level, (int)k, area, 2 * area,
+                3 * area);
+        for (int32_t v = 0; v < n; v++) check_near(at(force, v).z, at(hat, v).z, 1e-6 * largest);
+        pliant_player_destroy(hat);
+        pliant_player_destroy(sum);
+        pliant_player_destroy(force);
+    }
+}
+
+static void levels_are_those_of_the_solver(void **state)
+{
+    (void)state;
+    pliant_error err;
+    const int32_t a = free_vertex(whole, 2), b = free_vertex(whole, 6), c = free_vertex(whole, 90);
+    const int32_t f = fixed_vertex(whole);
+    pliant_player *player = create(whole);
+    play_ok(player,
+            "displace 0:%d 0.1 0 0\ndisplace 1:%d 0 0.1 0\ndisplace %d 0 0 0.1\nsupport 1:%d 0 0 "
+            "-0.1\nstep\n",
+            (int)a, (int)b, (int)c, (int)f);
+    pliant_solver *solver;
+    check_ok(pliant_solver_create(whole, NULL, &solver, &err), &err);
+    check_ok(pliant_solver_displace(solver, (pliant_node){0, a}, (pliant_vec3){0.1f, 0, 0}), NULL);
+    check_ok(pliant_solver_displace(solver, (pliant_node){1, b}, (pliant_vec3){0, 0.1f, 0}), NULL);
+    check_ok(pliant_solver_displace(solver, (pliant_node){2, c}, (pliant_vec3){0, 0, 0.1f}), NULL);
+    check_ok(pliant_solver_support(solver, (pliant_node){1, f}, (pliant_vec3){0, 0, -0.1f}), NULL);
+    assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
+    pliant_vec3 u[162];
+    check_ok(pliant_solver_surface(solver, 2, u), NULL);
+    assert_memory_equal(u, pliant_player_surface(player), sizeof u);
+    check_near(at(player, a).x, 0.1f, 0);
+    check_near(at(player, b).y, 0.1f, 0);
+    assert_int_equal(pliant_player_last(player)->report.constraint_count, 3);
+    assert_int_equal(pliant_player_last(player)->report.level, 2);
+    play_ok(player, "release %d\nstep\n", (int)c);
+    assert_int_equal(pliant_player_last(player)->report.level, 1);
+    pliant_solver_destroy(solver);
+    pliant_player_destroy(player);
+}
+
+static void the_last_statement_about_a_vertex_holds_on_whatever_level(void **state)
+{
+    (void)state;
+    const int32_t v = free_vertex(whole, 1);
+    int32_t count;
+    pliant_player *player = create(whole), *other = create(whole);
+    play_ok(player,
+            "displace 0:%d 0.1 0 0\nstep\ntraction 2:%d 0 0 5\nstep\ndisplace 1:%d 0 0.2 0\nstep\n",
+            (int)v, (int)v, (int)v);
+    const pliant_condition *conditions = pliant_player_conditions(player, &count);
+    assert_int_equal(count, 1);
+    assert_int_equal(conditions[0].node.level, 1);
+    assert_int_equal(conditions[0].kind, PLIANT_CONDITION_DISPLACED);
+    play_ok(other, "displace 1:%d 0 0.2 0\nstep\n", (int)v);
+    // Coherent sums leave rounding of the traction's response behind, some 1e-7 of it.
+    for (int32_t i = 0; i < 162; i++) check_near(at(player, i).y, at(other, i).y, 1e-6);
+    play_ok(player, "release 2:%d\nstep\n", (int)v);
+    pliant_player_conditions(player, &count);
+    assert_int_equal(count, 0);
+    for (int32_t i = 0; i < 162; i++) check_near(at(player, i).y, 0, 1e-6);
+    pliant_player_destroy(player);
+    pliant_player_destroy(other);
+}
+
+static double square_distance(const pliant_model *model, int32_t v, const double *x)
+{
+    const double *p = pliant_model_positions(model) + 3 * (size_t)v;
+    double sum = 0;
+    for (int c = 0; c < 3; c++) sum += (p[c] - x[c]) * (p[c] - x[c]);
+    return sum;
+}
+
+static void near_means_a_vertex_of_the_level(void **state)
+{
+    (void)state;
+    // For every level the nearest free vertex by trying all.
+    const double x[3] = {0.35, -0.2, 0.85};
+    int32_t nearest[3];
+    for (int32_t l = 0; l < 3; l++) {
+        nearest[l] = -1;
+        for (int32_t v = 0; v < pliant_model_level_vertex_count(whole, l); v++)
+            if (pliant_model_is_free(whole, v) == 1 &&
+                (nearest[l] < 0 ||
+                 square_distance(whole, v, x) < square_distance(whole, nearest[l], x)))
+                nearest[l] = v;
+    }
+    assert_true(nearest[0] != nearest[1] && nearest[1] != nearest[2]);
+    const struct {
+        const pliant_model *model;
+        const char *prefix;
+        pliant_node node;
+    } cases[] = {
+        {whole, "", {2, nearest[2]}},   {whole, "2:", {2, nearest[2]}},
+        {whole, "1:", {1, nearest[1]}}, {whole, "0:", {0, nearest[0]}},
+        {coarse, "", {1, nearest[1]}},  {coarse, "0:", {0, nearest[0]}},
+        {fine, "", {2, nearest[2]}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        int32_t count;
+        pliant_player *player = create(cases[i].model);
+        play_ok(player, "displace %snear 0.35 -0.2 0.85 0 0 0.1\nprobe p near 0.35 -0.2 0.85\n",
+                cases[i].prefix);
+        const pliant_condition *conditions = pliant_player_conditions(player, &count);
+        assert_int_equal(count, 1);
+        assert_int_equal(conditions[0].node.level, cases[i].node.level);
+        assert_int_equal(conditions[0].node.vertex, cases[i].node.vertex);
+        // A probe looks at any vertex, whatever the file has columns of.
+        assert_int_equal(pliant_player_probes(player, &count)[0].vertex, nearest[2]);
+        play_ok(player, "probe q vertex 0:near 0.35 -0.2 0.85\nprobe r vertex 161\n");
+        assert_int_equal(pliant_player_probes(player, &count)[1].vertex, nearest[0]);
+        play_ok(player, "release %snear 0.35 -0.2 0.85\nstep\n", cases[i].prefix);
+        pliant_player_conditions(player, &count);
+        assert_int_equal(count, 0);
+        pliant_player_destroy(player);
+    }
+}
+
+static pliant_player *create_with_deadline(const pliant_model *model, int64_t deadline_ns)
+{
+    pliant_error err;
+    pliant_player *player;
+    pliant_player_def def = pliant_player_default(model);
+    def.script_name = "t.script";
+    def.deadline_ns = deadline_ns;
+    check_ok(pliant_player_create(model, &def, &player, &err), &err);
+    return player;
+}
+
+static void a_step_that_would_be_late_is_solved_coarser_and_says_so(void **state)
+{
+    (void)state;
+    pliant_player *hurried = create_with_deadline(whole, 0);
+    pliant_player *patient = create_with_deadline(whole, INT64_C(3600000000000));
+    pliant_player *const players[] = {hurried, patient};
+    for (int i = 0; i < 2; i++) {
+        for (int k = 0; k < 40; k++)
+            play_ok(players[i], "displace %d 0 0 -0.1\n", (int)free_vertex(whole, k));
+        play_ok(players[i], "step\n");
+    }
+    const pliant_step *late = pliant_player_last(hurried), *done = pliant_player_last(patient);
+    assert_int_equal(late->status, PLIANT_LATE);
+    assert_int_equal(late->report.is_late, 1);
+    assert_int_equal(late->report.level, 0);
+    assert_int_equal(late->report.asked_count, 40);
+    check_at_least((double)late->report.lateness_ns, 1);
+    assert_int_equal(done->status, PLIANT_OK);
+    assert_int_equal(done->report.level, 2);
+    assert_int_equal(done->report.is_late, 0);
+    assert_int_equal(done->report.lateness_ns, 0);
+    // The state is what was stated: it is still all there.
+    int32_t count;
+    pliant_player_conditions(hurried, &count);
+    assert_int_equal(count, 40);
+    pliant_timings *timings = calloc(1, sizeof *timings), *all = calloc(1, sizeof *all);
+    pliant_timings_add(timings, late);
+    pliant_timings_add(timings, done);
+    pliant_timings_merge(all, timings);
+    pliant_timings_merge(all, timings);
+    assert_int_equal(all->punctuality.step_count, 4);
+    assert_int_equal(all->punctuality.missed_count, 2);
+    assert_int_equal(all->punctuality.coarser_count, 2);
+    assert_int_equal(all->punctuality.overrun_count, 2);
+    assert_int_equal(all->punctuality.level_counts[0], 2);
+    assert_int_equal(all->punctuality.level_counts[2], 2);
+    assert_int_equal(all->punctuality.worst_lateness_ns, late->report.lateness_ns);
+    free(timings);
+    free(all);
+    pliant_player_destroy(hurried);
+    pliant_player_destroy(patient);
+}
+
+static void compliance_is_the_definitions(void **state)
+{
+    (void)state;
+    const pliant_compliance kinds[] = {PLIANT_COMPLIANCE_STORED, PLIANT_COMPLIANCE_PASSIVE};
+    pliant_vec3 forces[2];
+    for (int i = 0; i < 2; i++) {
+        pliant_error err;
+        pliant_player *player;
+        pliant_player_def def = pliant_player_default(loose);
+        def.compliance = kinds[i];
+        check_ok(pliant_player_create(loose, &def, &player, &err), &err);
+        pliant_solver *solver;
+        pliant_solver_def solver_def = pliant_solver_default(loose);
+        solver_def.compliance = kinds[i];
+        check_ok(pliant_solver_create(loose, &solver_def, &solver, &err), &err);
+        // More than the first solver has room for: the larger one is of the same kind.
+        for (int k = 0; k < 70; k++) {
+            const int32_t v = free_vertex(loose, 3 * k);
+            play_ok(player, "displace %d 0 0 -0.1\n", (int)v);
+            if (k == 0) {
+                check_ok(
+                    pliant_solver_displace(solver, (pliant_node){3, v}, (pliant_vec3){0, 0, -0.1f}),
+                    NULL);
+                assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
+                play_ok(player, "step\n");
+                const pliant_vec3 f = pliant_solver_contact_force(solver);
+                assert_memory_equal(&pliant_player_last(player)->force, &f, sizeof f);
+            }
+        }
+        play_ok(player, "step\n");
+        forces[i] = pliant_player_last(player)->force;
+        pliant_solver_destroy(solver);
+        pliant_player_destroy(player);
+    }
+    // Compression has made the two differ.
+    assert_true(forces[0].x != forces[1].x || forces[0].z != forces[1].z);
+}
+
 static void mistakes_are_told_with_line_and_column(void **state)
 {
     (void)state;
@@ -266,6 +526,19 @@ static void mistakes_are_told_with_line_and_column(void **state)
         {whole, "traction 1:42 0 0 1", "t.script:1:10: vertex 42 of 42 on level 1"},
         {whole, "displace 3:1 0 0 1", "t.script:1:10: level 3: expected 0 to 2"},
         {whole, "release source 99999", "t.script:1:9: source vertex 99999 is not in the model"},
+        {whole, "support 3:near 0 0 0 0 0 1", "t.script:1:9: level 3: expected 0 to 2"},
+        {whole, "release 0:12", "t.script:1:9: vertex 12 of 12 on level 0"},
+        {whole, "displace 1:source 0 0 0 1",  // the input had the reverse order
+         "t.script:1:10: source vertex 0 is vertex 161 of 42 on level 1"},
+        {fine, "displace 1:0 0 0 1", "t.script:1:10: level 1 is not in the file: it has level 2"},
+        {fine, "force 0:near 0 0 1 0 0 1",
+         "t.script:1:7: level 0 is not in the file: it has level 2"},
+        {coarse, "traction 2:100 0 0 1",
+         "t.script:1:10: level 2 is not in the file: it has levels 0 to 1"},
+        {coarse, "displace 42 0 0 1",
+         "t.script:1:10: vertex 42 of 42 on level 1, the finest in the file"},
+        {coarse, "release source 0",
+         "t.script:1:9: source vertex 0 is vertex 161 of 42 on level 1, the finest in the file"},
         {whole, "probe p vertex 162", "t.script:1:7: vertex 162 of 162"},
         {whole, "probe p vertex 1\nprobe p vertex 2",
          "t.script:2:7: probe p is already there: expected another name"},
@@ -302,10 +575,6 @@ static void mistakes_are_told_with_line_and_column(void **state)
          "t.script:1:10: traction at the fixed vertex %d needs a model "
          "precomputed with --blocks all",
          fixed_vertex(loose)},
-        {whole, "displace 1:%d 0 0 1",
-         "t.script:1:10: level 1 is not in the file: expected "
-         "constraints on level 2",
-         v},
     };
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         pliant_error err;
@@ -338,8 +607,9 @@ static void a_refused_statement_changes_nothing(void **state)
     const int32_t a = free_vertex(whole, 7);
     play_ok(player, "probe p vertex %d\ndisplace %d 0.01 0 0\nstep\n", (int)a, (int)a);
     const pliant_step before = *pliant_player_last(player);
-    const char *const refused[] = {"displace 999 1 1 1", "support 999 1 1 1", "probe p vertex 1",
-                                   "expect p 9 9 9 1",   "expect q 0 0 0 1",  "displace 0:1 1 1 1"};
+    const char *const refused[] = {"displace 999 1 1 1", "support 999 1 1 1",
+                                   "probe p vertex 1",   "expect p 9 9 9 1",
+                                   "expect q 0 0 0 1",   "displace 0:12 1 1 1"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
         assert_true(play(player, NULL, &err, refused[i]) < 0);
     int32_t count;
@@ -472,18 +742,18 @@ static void more_conditions_than_the_solver_began_with_are_played(void **state)
 static void probes_are_exact_whatever_the_level_of_the_surface(void **state)
 {
     (void)state;
-    pliant_player *fine = create(loose), *coarse = create_at(loose, 1);
-    assert_int_equal(pliant_player_surface_count(coarse), 42);
+    pliant_player *all = create(loose), *some = create_at(loose, 1);
+    assert_int_equal(pliant_player_surface_count(some), 42);
     const int32_t near = free_vertex(loose, 3), far = free_vertex(loose, 300);
-    pliant_player *const players[] = {fine, coarse};
+    pliant_player *const players[] = {all, some};
     for (int i = 0; i < 2; i++)
         play_ok(players[i],
                 "probe near vertex %d\nprobe far vertex %d\nprobe held vertex %d\n"
                 "displace near 0 0 1 0 0 -0.1\ntraction near 1 0 0 0 0 1\nstep\n",
                 (int)near, (int)far, (int)fixed_vertex(loose));
     int32_t count;
-    const pliant_probe *exact = pliant_player_probes(fine, &count);
-    const pliant_probe *found = pliant_player_probes(coarse, &count);
+    const pliant_probe *exact = pliant_player_probes(all, &count);
+    const pliant_probe *found = pliant_player_probes(some, &count);
     assert_int_equal(count, 3);
     for (int32_t i = 0; i < count; i++) {
         // The same sums in another order, of numbers below 1.
@@ -491,8 +761,8 @@ static void probes_are_exact_whatever_the_level_of_the_surface(void **state)
         check_near(found[i].u.z, exact[i].u.z, 1e-6);
     }
     check_near(found[2].u.z, 0, 0);
-    pliant_player_destroy(fine);
-    pliant_player_destroy(coarse);
+    pliant_player_destroy(all);
+    pliant_player_destroy(some);
 }
 
 static void late_probes_follow_the_rule(void **state)
@@ -547,18 +817,25 @@ static void steps_do_not_allocate(void **state)
 #else
     pliant_player *player = create_at(loose, 2);
     play_ok(player, "probe p near 0 0 1\nprobe q near 1 0 0\n");
-    pliant_statement statements[5];
+    enum { LINES = 8 };
+    pliant_statement statements[LINES];
     pliant_error err;
-    const char *const lines[] = {"displace near 0 0 1 0 0 -0.01", "displace near 0.1 0 1 0 0 -0.02",
-                                 "traction near 1 0 0 0 1 0", "step 10", "release near 0.1 0 1"};
-    for (int i = 0; i < 5; i++)
+    const char *const lines[LINES] = {"displace near 0 0 1 0 0 -0.01",
+                                      "displace near 0.1 0 1 0 0 -0.02",
+                                      "traction near 1 0 0 0 1 0",
+                                      "displace 0:near 0 0 1 0 0 -0.01",
+                                      "step 10",
+                                      "release near 0.1 0 1",
+                                      "displace 1:near 0 1 0 0 0 0",
+                                      "force 2:near 1 0 0 0 1 0"};
+    for (int i = 0; i < LINES; i++)
         check_ok(pliant_statement_parse(lines[i], strlen(lines[i]), "t.script", 1, 0,
                                         &statements[i], &err),
                  &err);
     const long before = allocation_count;
     int refused = 0;
     for (int round = 0; round < 50; round++)
-        for (int i = 0; i < 5; i++)
+        for (int i = 0; i < LINES; i++)
             refused += pliant_player_execute(player, &statements[i], NULL, NULL) < 0;
     const long after = allocation_count;
     assert_int_equal(refused, 0);
@@ -576,6 +853,12 @@ int main(void)
         cmocka_unit_test(releasing_one_condition_keeps_the_others),
         cmocka_unit_test(all_names_of_a_vertex_are_the_same_vertex),
         cmocka_unit_test(force_is_traction_times_vertex_area),
+        cmocka_unit_test(a_load_on_a_level_is_the_sum_of_loads_over_its_hat),
+        cmocka_unit_test(levels_are_those_of_the_solver),
+        cmocka_unit_test(the_last_statement_about_a_vertex_holds_on_whatever_level),
+        cmocka_unit_test(near_means_a_vertex_of_the_level),
+        cmocka_unit_test(a_step_that_would_be_late_is_solved_coarser_and_says_so),
+        cmocka_unit_test(compliance_is_the_definitions),
         cmocka_unit_test(mistakes_are_told_with_line_and_column),
         cmocka_unit_test(numbers_beyond_single_precision_are_refused),
         cmocka_unit_test(a_refused_statement_changes_nothing),

@@ -29,17 +29,18 @@ typedef enum pliant_statement_kind {
 
 typedef enum pliant_vertex_kind {
     PLIANT_VERTEX_NONE,
-    PLIANT_VERTEX_MODEL,   // K: number in the model, finest level
-    PLIANT_VERTEX_LEVEL,   // L:K: the hierarchical basis function of vertex K on level L
+    PLIANT_VERTEX_MODEL,   // K: number in the model
     PLIANT_VERTEX_SOURCE,  // source K: number in the input mesh
     PLIANT_VERTEX_NEAR,    // near X Y Z: the free vertex nearest to a rest position
     PLIANT_VERTEX_ALL,     // all (release only)
 } pliant_vertex_kind;
 
-// VERTEX may be any of K, L:K, source K, near X Y Z.
+// VERTEX may be any of K, source K, near X Y Z; with "L:" before it, the hierarchical basis
+// function of that vertex on level L.
 typedef struct pliant_vertex_name {
     pliant_vertex_kind kind;
-    int32_t level, number;
+    int32_t has_level, level;  // level is 0 unless has_level
+    int32_t number;
     double position[3];
 } pliant_vertex_name;
 

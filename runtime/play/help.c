@@ -1,0 +1,90 @@
+// help.c: what pliant-play --help says.
+#include "options.h"
+
+#include <stddef.h>
+
+static const char options[] =
+    "usage: pliant-play [options] MODEL.h5 [SCRIPT]\n"
+    "\n"
+    "Plays a contact script on a model that pliant-precompute made. SCRIPT is a file;\n"
+    "`-` or none is standard input, answered line by line: every step prints its line\n"
+    "at once, expect prints ok or the failure, other statements print nothing. After a\n"
+    "script file, a short table: timings by phase in microseconds, then the probes'\n"
+    "displacements and the total contact force at the last step.\n"
+    "\n"
+    "  -o, --output FILE.csv   one row per step: step, time, solve_us, constraints,\n"
+    "                          level, x y z of each probe's displacement, x y z of the\n"
+    "                          total contact force\n"
+    "      --frames FILE.h5    HDF5: displacement f4[steps,vertices,3], step, time,\n"
+    "                          solve_us. Needs as much disk again while it plays\n"
+    "      --vtk DIR           DIR/pliant.pvd and a .vtp per step, for ParaView: the\n"
+    "                          deformed surface, displacement, traction. DIR is made\n"
+    "                          when absent, refused when it holds another series\n"
+    "      --force             write into DIR all the same; the other files stay\n"
+    "      --lod L             reconstruct the surface up to level L only (0 coarsest).\n"
+    "                          --frames and --vtk then hold the vertices of level L;\n"
+    "                          probes and expect stay exact\n"
+    "      --deadline-us T     give every solve T microseconds. What would take longer is\n"
+    "                          solved on the finest constraint level that fits; the end\n"
+    "                          tells how many steps missed the deadline, on which levels\n"
+    "                          they were solved and the worst lateness. A late step is\n"
+    "                          no failure\n"
+    "      --passive           keep the contact compliance symmetric and positive\n"
+    "                          definite whatever compression did to it: contact then\n"
+    "                          never gains energy\n"
+    "      --repeat N          play the whole script N times, each time with a new\n"
+    "                          solver; timings are of all passes but the first, which\n"
+    "                          the table gives apart. Outputs come from the first\n"
+    "      --threads N         N solvers play the script at once on the shared model;\n"
+    "                          timings are pooled, outputs come from the first\n"
+    "      --compare DENSE.h5  solve every step with the dense matrices too (written by\n"
+    "                          pliant-precompute --dense), and print the relative RMS\n"
+    "                          and MAX differences\n"
+    "      --json              JSON instead of text: one object at the end; from\n"
+    "                          standard input also one per step and expect, a line each\n"
+    "      --no-verify         do not verify the model's checksums at the start\n"
+    "  -q, --quiet             print results only where an option asks for them\n"
+    "  -h, --help              this text\n"
+    "      --version           print the version\n"
+    "\n";
+
+static const char notes[] =
+    "solve_us and `total` are the whole step: from the state to the surface. Percentiles\n"
+    "are within 0.4%. --repeat and --threads need a script that is a regular file. With\n"
+    "-o, or --json from standard input, probes must be declared before the first step.\n"
+    "\n";
+
+static const char language[] =
+    "The script: one statement a line, # comments; statements change the state, `step`\n"
+    "solves. A VERTEX is K (the model's number), source K (vertex K of the input mesh) or\n"
+    "near X Y Z (the free vertex nearest to a rest position), on the finest level that\n"
+    "the file has columns of; L:K, L:source K, L:near X Y Z on level L: the statement\n"
+    "then acts through that level's hat function. One vertex has one condition: the last\n"
+    "statement about it holds, whatever its level.\n"
+    "\n"
+    "  pliant-script 1               first statement: version of the language\n"
+    "  probe NAME vertex VERTEX      report this vertex; also: probe NAME near X Y Z\n"
+    "  displace VERTEX X Y Z         contact displacement at a free vertex\n"
+    "  traction VERTEX X Y Z         force per area\n"
+    "  force VERTEX X Y Z            force; traction = force / area of the vertex's hat\n"
+    "  support VERTEX X Y Z          displacement of a fixed vertex\n"
+    "  gravity X Y Z                 acceleration\n"
+    "  release VERTEX | release all  back to the reference condition; all: gravity too\n"
+    "  dt SECONDS                    time that a step takes, 0.001 at the start\n"
+    "  step [COUNT]                  solve now, or COUNT times\n"
+    "  expect NAME X Y Z TOLERANCE   fail when the probe is further off at the last step\n"
+    "\n";
+
+static const char ending[] =
+    "A mistake or a failed expect ends the play (typed at a terminal: it is told, and\n"
+    "the play goes on). A play that fails leaves no file under an output's name: what\n"
+    "stood there before stays.\n"
+    "\n"
+    "Exit status: 0 done, 1 failed (broken file, failed expect, full disk), 2 misused.\n"
+    "\n"
+    "example:\n"
+    "  printf 'pliant-script 1\\nprobe p vertex 812\\nforce 812 0 0 -3\\nstep\\n' |\n"
+    "      pliant-play bunny.h5\n"
+    "  pliant-play -o poke.csv --vtk poke bunny.h5 poke.script\n";
+
+const char *const pliant_play_help[] = {options, notes, language, ending, NULL};
