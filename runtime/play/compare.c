@@ -6,7 +6,9 @@
 //
 //     Xi_SS x = vbar_S - Xi_SR vbar_R - B_S g,     v = Xi_S x + Xi_R vbar_R + B g,
 //
-// which is what the capacitance matrix algorithm computes with C = -Xi_SS (GF-18..20).
+// which is what the capacitance matrix algorithm computes with C = -Xi_SS (GF-18..20). A node of
+// level l acts through its hat h: its column is sum_j h_j Xi_j (GF-60), and its row is that of its
+// vertex, where hats interpolate (GF-69). Levels may be mixed.
 #include "compare.h"
 
 #include "pliant/dense_view.h"
@@ -21,7 +23,7 @@
 extern void dgesv_(const int *n, const int *nrhs, double *a, const int *lda, int *pivots, double *b,
                    const int *ldb, int *info);
 
-// Columns gathered from the row-major file for a node that stays changed or loaded are kept:
+// Columns summed from the row-major file for a node that stays changed or loaded are kept:
 // gathering strides over the whole matrix and dominates otherwise. 128 MB at most.
 enum { COLUMN_CACHE_BYTES = 128 << 20 };
 
@@ -30,8 +32,11 @@ struct pliant_compare {
     const pliant_model *model;
     pliant_reader *reader;
     pliant_dense_view view;
-    int32_t vertex_count, finest;
+    int32_t vertex_count, level_count;
+    size_t
+        row_count;  // 3 (m + k): rows of the free nodes, then of the fixed ones if they are stored
     int32_t *position;  // [n] place in free nodes, or -1 - place in fixed nodes
+    int32_t *parents;   // [n][2] of a vertex that is not of level 0
 
     // The present problem. Conditions are sorted: changed nodes first, then loaded ones.
     pliant_condition *conditions;  // [condition_count]
@@ -43,14 +48,20 @@ struct pliant_compare {
     size_t matrix_capacity;  // 3s that the three above have room for
     int solved;              // 1: u and force belong to conditions and gravity
 
-    double *free_u;  // [3m]
-    double *u;       // [3n]
+    double *rows;  // [row_count]
+    double *u;     // [3n]
     double force[3];
 
-    // Gathered columns, free rows: three columns [3m] each per place, replaced in turn.
+    // A node's hat: its support in its domain, vertices ascending.
+    double *hat;          // [n], zero but while a hat is made
+    int32_t *hat_vertex;  // [hat_count]
+    double *hat_value;    // [hat_count]
+    int32_t hat_count;
+
+    // Summed columns: three [row_count] each per place, replaced in turn.
     double *columns;
-    int32_t *column_vertex;  // [column_capacity] vertex, -1 empty
-    int32_t *column_place;   // [n] place, -1 not gathered
+    pliant_node *column_node;  // [column_capacity]; level -1: empty
+    int32_t *column_place;     // [n]: of a node of this vertex, -1: not summed
     int32_t column_capacity, column_next;
 
     double square, exact_square;  // sums over all steps
@@ -88,28 +99,54 @@ static pliant_status check_nodes(const pliant_compare *c, pliant_error *err)
     return PLIANT_OK;
 }
 
+// Of every vertex of a level above the base: the ends of the edge that it divides. The children of
+// face (a, b, c) begin with (a, ab, ca) and (b, bc, ab).
+static void find_parents(const pliant_compare *c)
+{
+    for (int32_t l = 0; l + 1 < c->level_count; l++) {
+        const int32_t *face = pliant_model_faces(c->model, l);
+        const int32_t *child = pliant_model_faces(c->model, l + 1);
+        const int32_t count = pliant_model_level_face_count(c->model, l);
+        for (int32_t f = 0; f < count; f++, face += 3, child += 12) {
+            const int32_t middle[3] = {child[1], child[4], child[2]};
+            for (int k = 0; k < 3; k++) {
+                c->parents[2 * (size_t)middle[k]] = face[k];
+                c->parents[2 * (size_t)middle[k] + 1] = face[(k + 1) % 3];
+            }
+        }
+    }
+}
+
 static pliant_status allocate(pliant_compare *c, pliant_error *err)
 {
-    const size_t n = (size_t)c->vertex_count, m = (size_t)c->view.free_count;
-    const size_t block = 9 * m * sizeof(double);
-    const size_t places = block ? COLUMN_CACHE_BYTES / block : 1;
-    c->column_capacity = (int32_t)(places < 1 ? 1 : places < m ? places : m);
-    if (c->column_capacity < 1) c->column_capacity = 1;
+    const size_t n = (size_t)c->vertex_count;
+    const size_t node_count =
+        (size_t)c->view.free_count + (c->view.has_supports ? (size_t)c->view.fixed_count : 0);
+    c->row_count = 3 * node_count;
+    const size_t bytes = 3 * c->row_count * sizeof *c->columns;
+    const size_t places = bytes ? COLUMN_CACHE_BYTES / bytes : 1;
+    c->column_capacity = (int32_t)(places < 1 ? 1 : places < n ? places : n);
     c->position = malloc(n * sizeof *c->position);
-    c->free_u = calloc(3 * m + 1, sizeof *c->free_u);
+    c->parents = calloc(2 * n, sizeof *c->parents);
+    c->rows = calloc(c->row_count + 1, sizeof *c->rows);
     c->u = calloc(3 * n + 1, sizeof *c->u);
-    c->columns = malloc((size_t)c->column_capacity * block + 1);
-    c->column_vertex = malloc((size_t)c->column_capacity * sizeof *c->column_vertex);
+    c->hat = calloc(n, sizeof *c->hat);
+    c->hat_vertex = malloc(n * sizeof *c->hat_vertex);
+    c->hat_value = malloc(n * sizeof *c->hat_value);
+    c->columns = malloc((size_t)c->column_capacity * bytes + 1);
+    c->column_node = malloc((size_t)c->column_capacity * sizeof *c->column_node);
     c->column_place = malloc(n * sizeof *c->column_place);
-    if (!c->position || !c->free_u || !c->u || !c->columns || !c->column_vertex || !c->column_place)
+    if (!c->position || !c->parents || !c->rows || !c->u || !c->hat || !c->hat_vertex ||
+        !c->hat_value || !c->columns || !c->column_node || !c->column_place)
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory to compare %d vertices",
                                 c->path, (int)c->vertex_count);
     for (size_t v = 0; v < n; v++) c->position[v] = -1;
     for (size_t v = 0; v < n; v++) c->column_place[v] = -1;
-    for (int32_t i = 0; i < c->column_capacity; i++) c->column_vertex[i] = -1;
+    for (int32_t i = 0; i < c->column_capacity; i++) c->column_node[i].level = -1;
     for (int32_t i = 0; i < c->view.free_count; i++) c->position[c->view.nodes[i]] = i;
     for (int32_t i = 0; c->view.has_supports && i < c->view.fixed_count; i++)
         c->position[c->view.fixed_nodes[i]] = -1 - i;
+    find_parents(c);
     return PLIANT_OK;
 }
 
@@ -124,7 +161,7 @@ pliant_status pliant_compare_open(const char *path, const pliant_model *model,
     const pliant_model_info info = pliant_model_describe(model);
     c->model = model;
     c->vertex_count = info.vertex_count;
-    c->finest = info.level_count - 1;
+    c->level_count = info.level_count;
     pliant_status status = pliant_reader_open(path, &c->reader, err);
     if (status >= 0) status = pliant_dense_view_bind(c->reader, &c->view, err);
     if (status >= 0) status = check_nodes(c, err);
@@ -141,63 +178,100 @@ void pliant_compare_close(pliant_compare *compare)
 {
     if (!compare) return;
     free(compare->column_place);
-    free(compare->column_vertex);
+    free(compare->column_node);
     free(compare->columns);
+    free(compare->hat_value);
+    free(compare->hat_vertex);
+    free(compare->hat);
     free(compare->u);
-    free(compare->free_u);
+    free(compare->rows);
     free(compare->pivots);
     free(compare->right);
     free(compare->matrix);
     free(compare->conditions);
+    free(compare->parents);
     free(compare->position);
     pliant_reader_close(compare->reader);
     free(compare->path);
     free(compare);
 }
 
-// ---- Entries of the dense matrices ----
+// ---- Columns of nodes ----
 
 static int is_free(const pliant_compare *c, int32_t vertex)
 {
     return c->position[vertex] >= 0;
 }
 
-// Xi's 3x3 block of two nodes: element (0, 0), and the distance between its rows.
-static const double *block_at(const pliant_compare *c, int32_t row, int32_t column, size_t *stride)
+// A vertex's place among the free nodes, or among the fixed ones.
+static size_t place_in_domain(const pliant_compare *c, int32_t vertex)
+{
+    const int32_t position = c->position[vertex];
+    return (size_t)(position >= 0 ? position : -1 - position);
+}
+
+static size_t row_of(const pliant_compare *c, int32_t vertex)
+{
+    const size_t first = is_free(c, vertex) ? 0 : 3 * (size_t)c->view.free_count;
+    return first + 3 * place_in_domain(c, vertex);
+}
+
+// hat_vertex and hat_value of a node: one at its vertex, the mean of the parents at vertices that
+// finer levels add, zero outside its vertex's domain (GF-53).
+static void make_hat(pliant_compare *c, pliant_node node)
+{
+    const int domain = is_free(c, node.vertex);
+    c->hat_vertex[0] = node.vertex;
+    c->hat_value[0] = c->hat[node.vertex] = 1;
+    c->hat_count = 1;
+    const int32_t begin = pliant_model_level_vertex_count(c->model, node.level);
+    for (int32_t v = begin; v < c->vertex_count; v++) {
+        const int32_t *parents = c->parents + 2 * (size_t)v;
+        const double value = 0.5 * (c->hat[parents[0]] + c->hat[parents[1]]);
+        if (value == 0 || is_free(c, v) != domain) continue;
+        c->hat_vertex[c->hat_count] = v;
+        c->hat_value[c->hat_count++] = c->hat[v] = value;
+    }
+    for (int32_t i = 0; i < c->hat_count; i++) c->hat[c->hat_vertex[i]] = 0;
+}
+
+// The hat's three columns on the rows of one domain into column[3][row_count], from its row `to`.
+static void sum_rows(const pliant_compare *c, const double *matrix, size_t count, size_t width,
+                     double *column, size_t to)
+{
+    for (size_t row = 0; row < 3 * count; row++, matrix += width) {
+        double sum[3] = {0};
+        for (int32_t i = 0; i < c->hat_count; i++) {
+            const double *from = matrix + 3 * place_in_domain(c, c->hat_vertex[i]);
+            for (int k = 0; k < 3; k++) sum[k] += c->hat_value[i] * from[k];
+        }
+        for (size_t k = 0; k < 3; k++) column[k * c->row_count + to + row] = sum[k];
+    }
+}
+
+// A node's three columns, shape [3][row_count].
+static const double *gather(pliant_compare *c, pliant_node node)
 {
     const pliant_dense_view *view = &c->view;
-    const size_t m3 = 3 * (size_t)view->free_count, k3 = 3 * (size_t)view->fixed_count;
-    const int row_free = is_free(c, row), column_free = is_free(c, column);
-    const double *matrix = row_free ? (column_free ? view->free_free : view->free_fixed)
-                                    : (column_free ? view->fixed_free : view->fixed_fixed);
-    const int32_t i = row_free ? c->position[row] : -1 - c->position[row];
-    const int32_t j = column_free ? c->position[column] : -1 - c->position[column];
-    *stride = column_free ? m3 : k3;
-    return matrix + 3 * (size_t)i * *stride + 3 * (size_t)j;
-}
-
-static const double *gravity_at(const pliant_compare *c, int32_t row)
-{
-    return is_free(c, row) ? c->view.gravity_free + 9 * (size_t)c->position[row]
-                           : c->view.gravity_fixed + 9 * (size_t)(-1 - c->position[row]);
-}
-
-// A node's three columns on the free rows, shape [3][3m].
-static const double *gather(pliant_compare *c, int32_t vertex)
-{
-    const size_t m3 = 3 * (size_t)c->view.free_count;
-    if (c->column_place[vertex] >= 0) return c->columns + 3 * m3 * (size_t)c->column_place[vertex];
-    const int32_t place = c->column_next;
-    c->column_next = (place + 1) % c->column_capacity;
-    if (c->column_vertex[place] >= 0) c->column_place[c->column_vertex[place]] = -1;
-    c->column_vertex[place] = vertex;
-    c->column_place[vertex] = place;
-    double *column = c->columns + 3 * m3 * (size_t)place;
-    if (m3 == 0) return column;
-    size_t stride;
-    const double *from = block_at(c, c->view.nodes[0], vertex, &stride);
-    for (size_t row = 0; row < m3; row++, from += stride)
-        for (size_t k = 0; k < 3; k++) column[k * m3 + row] = from[k];
+    const size_t size = 3 * c->row_count, m = (size_t)view->free_count;
+    int32_t place = c->column_place[node.vertex];
+    if (place >= 0 && c->column_node[place].level == node.level)
+        return c->columns + size * (size_t)place;
+    if (place < 0) {
+        place = c->column_next;
+        c->column_next = (place + 1) % c->column_capacity;
+        if (c->column_node[place].level >= 0) c->column_place[c->column_node[place].vertex] = -1;
+    }
+    c->column_node[place] = node;
+    c->column_place[node.vertex] = place;
+    double *column = c->columns + size * (size_t)place;
+    const int column_free = is_free(c, node.vertex);
+    const size_t width = 3 * (size_t)(column_free ? view->free_count : view->fixed_count);
+    make_hat(c, node);
+    sum_rows(c, column_free ? view->free_free : view->free_fixed, m, width, column, 0);
+    if (view->has_supports)
+        sum_rows(c, column_free ? view->fixed_free : view->fixed_fixed, (size_t)view->fixed_count,
+                 width, column, 3 * m);
     return column;
 }
 
@@ -243,12 +317,6 @@ static pliant_status take_state(pliant_compare *c, const pliant_player *player, 
     for (int pass = 0; pass < 2; pass++) {
         for (int32_t i = 0; i < count; i++) {
             if (is_changed(c, &list[i]) != (pass == 0)) continue;
-            if (list[i].node.level != c->finest)
-                return pliant_error_set(err, PLIANT_ERR_MISSING,
-                                        "%s: step %lld: a constraint on level %d cannot be "
-                                        "compared: expected level %d",
-                                        c->path, (long long)step, (int)list[i].node.level,
-                                        (int)c->finest);
             if (!c->view.has_supports && pliant_model_is_free(c->model, list[i].node.vertex) != 1)
                 return pliant_error_set(err, PLIANT_ERR_MISSING,
                                         "%s: step %lld changes the fixed vertex %d: expected a "
@@ -286,6 +354,12 @@ static void unpack(pliant_vec3 v, double x[3])
     x[0] = v.x, x[1] = v.y, x[2] = v.z;
 }
 
+static const double *gravity_at(const pliant_compare *c, size_t row)
+{
+    const size_t m3 = 3 * (size_t)c->view.free_count;
+    return row < m3 ? c->view.gravity_free + 3 * row : c->view.gravity_fixed + 3 * (row - m3);
+}
+
 // x of the changed nodes into c->right.
 static pliant_status solve_changed(pliant_compare *c, int64_t step, pliant_error *err)
 {
@@ -294,27 +368,24 @@ static pliant_status solve_changed(pliant_compare *c, int64_t step, pliant_error
     const int size = 3 * c->changed_count;
     double g[3], value[3];
     unpack(c->gravity, g);
-    size_t stride;
     for (int32_t i = 0; i < c->changed_count; i++) {
-        const int32_t row = c->conditions[i].node.vertex;
-        double *right = c->right + 3 * (size_t)i;
-        unpack(c->conditions[i].value, right);
-        const double *body = g[0] != 0 || g[1] != 0 || g[2] != 0 ? gravity_at(c, row) : NULL;
-        for (int r = 0; body && r < 3; r++)
-            for (int k = 0; k < 3; k++) right[r] -= body[3 * r + k] * g[k];
-        for (int32_t j = 0; j < c->condition_count; j++) {
-            const double *block = block_at(c, row, c->conditions[j].node.vertex, &stride);
-            if (j < c->changed_count) {
-                for (int r = 0; r < 3; r++)
-                    for (int k = 0; k < 3; k++)
-                        c->matrix[(size_t)(3 * j + k) * (size_t)size + (size_t)(3 * i + r)] =
-                            block[(size_t)r * stride + (size_t)k];
-            } else {
-                unpack(c->conditions[j].value, value);
-                for (int r = 0; r < 3; r++)
-                    for (int k = 0; k < 3; k++)
-                        right[r] -= block[(size_t)r * stride + (size_t)k] * value[k];
-            }
+        const size_t row = row_of(c, c->conditions[i].node.vertex);
+        unpack(c->conditions[i].value, c->right + 3 * (size_t)i);
+        for (size_t r = 0; r < 3; r++)
+            for (size_t k = 0; k < 3; k++)
+                c->right[3 * (size_t)i + r] -= gravity_at(c, row + r)[k] * g[k];
+    }
+    for (int32_t j = 0; j < c->condition_count; j++) {
+        const double *column = gather(c, c->conditions[j].node);
+        unpack(c->conditions[j].value, value);
+        for (int32_t i = 0; i < c->changed_count; i++) {
+            const double *block = column + row_of(c, c->conditions[i].node.vertex);
+            for (size_t k = 0; k < 3; k++, block += c->row_count)
+                for (size_t r = 0; r < 3; r++)
+                    if (j < c->changed_count)
+                        c->matrix[(3 * (size_t)j + k) * (size_t)size + 3 * (size_t)i + r] =
+                            block[r];
+                    else c->right[3 * (size_t)i + r] -= block[r] * value[k];
         }
     }
     if (size == 0) return PLIANT_OK;
@@ -328,35 +399,45 @@ static pliant_status solve_changed(pliant_compare *c, int64_t step, pliant_error
     return PLIANT_OK;
 }
 
+// What a condition adds besides its columns: force of a displaced node, traction times the area
+// of its hat; displacement of a fixed one, its hat times x or its support value.
+static void add_hat(pliant_compare *c, const pliant_condition *condition, const double value[3])
+{
+    const int fixed = !is_free(c, condition->node.vertex);
+    if (!fixed && condition->kind != PLIANT_CONDITION_DISPLACED) return;
+    make_hat(c, condition->node);
+    double area = 0;
+    for (int32_t i = 0; i < c->hat_count; i++) {
+        const int32_t vertex = c->hat_vertex[i];
+        area += c->hat_value[i] * pliant_model_area(c->model, vertex);
+        for (int k = 0; fixed && k < 3; k++)
+            c->u[3 * (size_t)vertex + (size_t)k] += c->hat_value[i] * value[k];
+    }
+    for (int k = 0; !fixed && k < 3; k++) c->force[k] += area * value[k];
+}
+
 // All displacements and the contact force from x.
 static void evaluate(pliant_compare *c)
 {
-    const size_t m3 = 3 * (size_t)c->view.free_count;
     double g[3], value[3];
     unpack(c->gravity, g);
-    for (size_t row = 0; row < m3; row++) {
-        const double *body = c->view.gravity_free + 3 * row;
-        c->free_u[row] = body[0] * g[0] + body[1] * g[1] + body[2] * g[2];
+    for (size_t row = 0; row < c->row_count; row++) {
+        const double *body = gravity_at(c, row);
+        c->rows[row] = body[0] * g[0] + body[1] * g[1] + body[2] * g[2];
     }
     memset(c->u, 0, 3 * (size_t)c->vertex_count * sizeof *c->u);
     memset(c->force, 0, sizeof c->force);
     for (int32_t j = 0; j < c->condition_count; j++) {
         const pliant_condition *condition = &c->conditions[j];
-        const int32_t vertex = condition->node.vertex;
         if (j < c->changed_count) memcpy(value, c->right + 3 * (size_t)j, sizeof value);
         else unpack(condition->value, value);
-        const double *column = gather(c, vertex);
-        for (int k = 0; k < 3; k++)
-            for (size_t row = 0; row < m3; row++)
-                c->free_u[row] += column[(size_t)k * m3 + row] * value[k];
-        // For a fixed node x, or its support value, is its displacement.
-        if (!is_free(c, vertex)) memcpy(c->u + 3 * (size_t)vertex, value, sizeof value);
-        if (condition->kind == PLIANT_CONDITION_DISPLACED)
-            for (int k = 0; k < 3; k++)
-                c->force[k] += pliant_model_area(c->model, vertex) * value[k];
+        const double *column = gather(c, condition->node);
+        for (size_t k = 0; k < 3; k++, column += c->row_count)
+            for (size_t row = 0; row < c->row_count; row++) c->rows[row] += column[row] * value[k];
+        add_hat(c, condition, value);
     }
     for (int32_t i = 0; i < c->view.free_count; i++)
-        memcpy(c->u + 3 * (size_t)c->view.nodes[i], c->free_u + 3 * (size_t)i, 3 * sizeof *c->u);
+        memcpy(c->u + 3 * (size_t)c->view.nodes[i], c->rows + 3 * (size_t)i, 3 * sizeof *c->u);
 }
 
 // ---- Differences ----
