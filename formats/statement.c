@@ -256,6 +256,17 @@ static pliant_status parse_release(cursor *c, pliant_statement *s)
     return PLIANT_OK;
 }
 
+static pliant_status parse_deadline(cursor *c, pliant_statement *s)
+{
+    if (is_word(peek(c), "none")) {
+        take(c);
+        s->count = -1;
+        return PLIANT_OK;
+    }
+    return parse_integer(c, "microseconds, a whole number from 0 to 1000000000, or none", 0,
+                         PLIANT_SCRIPT_DEADLINE_LIMIT, &s->count);
+}
+
 static pliant_status parse_dt(cursor *c, pliant_statement *s)
 {
     const word w = peek(c);
@@ -297,6 +308,7 @@ static const struct {
     {"support", PLIANT_STATEMENT_SUPPORT, parse_load},
     {"gravity", PLIANT_STATEMENT_GRAVITY, parse_gravity},
     {"release", PLIANT_STATEMENT_RELEASE, parse_release},
+    {"deadline", PLIANT_STATEMENT_DEADLINE, parse_deadline},
     {"dt", PLIANT_STATEMENT_DT, parse_dt},
     {"step", PLIANT_STATEMENT_STEP, parse_step},
     {"expect", PLIANT_STATEMENT_EXPECT, parse_expect},
@@ -340,7 +352,7 @@ static pliant_status parse(cursor *c, int first, pliant_statement *s)
     }
     return refuse(
         c, PLIANT_ERR_FORMAT, w,
-        "probe, displace, traction, force, support, gravity, release, dt, step or expect");
+        "probe, displace, traction, force, support, gravity, release, deadline, dt, step or expect");
 }
 
 pliant_status pliant_statement_parse(const char *text, size_t length, const char *name,

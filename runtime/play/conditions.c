@@ -5,14 +5,12 @@
 
 #include <stdlib.h>
 
-enum { FIRST_CAPACITY = 64 };
-
 struct pliant_conditions {
     const pliant_model *model;
     pliant_solver_def solver_def;
     pliant_solver *solver;
-    pliant_condition *list;
-    int32_t count, capacity;
+    pliant_condition *list;  // [n]: a vertex has one at most
+    int32_t count;
     pliant_vec3 gravity;
     int32_t *slot;  // [n] 1 + the place in list of a vertex; 0 in the reference condition
     int32_t vertex_count;
@@ -31,9 +29,8 @@ pliant_status pliant_conditions_create(const pliant_model *model, pliant_complia
     if (!c) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a script's state");
     c->model = model;
     c->vertex_count = pliant_model_describe(model).vertex_count;
-    c->capacity = FIRST_CAPACITY;
     c->slot = calloc((size_t)c->vertex_count, sizeof *c->slot);
-    c->list = calloc(FIRST_CAPACITY, sizeof *c->list);
+    c->list = calloc((size_t)c->vertex_count, sizeof *c->list);
     c->solver_def = pliant_solver_default(model);
     c->solver_def.compliance = compliance;
     pliant_status status = PLIANT_OK;
@@ -118,24 +115,11 @@ static growth growth_for(const pliant_conditions *conditions, const pliant_condi
 
 // ---- Changes ----
 
-static pliant_status reserve_one(pliant_conditions *conditions)
-{
-    if (conditions->count < conditions->capacity) return PLIANT_OK;
-    const size_t capacity = 2 * (size_t)conditions->capacity;
-    pliant_condition *list = realloc(conditions->list, capacity * sizeof *list);
-    if (!list) return PLIANT_ERR_MEMORY;
-    conditions->list = list;
-    conditions->capacity = (int32_t)capacity;
-    return PLIANT_OK;
-}
-
 pliant_status pliant_conditions_set(pliant_conditions *conditions,
                                     const pliant_condition *condition)
 {
     int32_t *slot = &conditions->slot[condition->node.vertex];
-    pliant_status status = *slot == 0 ? reserve_one(conditions) : PLIANT_OK;
-    if (status < 0) return status;
-    status = apply(conditions->solver, condition);
+    pliant_status status = apply(conditions->solver, condition);
     while (status == PLIANT_ERR_CAPACITY) {
         status = grow(conditions, growth_for(conditions, condition));
         if (status < 0) return status;

@@ -70,6 +70,8 @@ static const char language[] =
     "  support VERTEX X Y Z          displacement of a fixed vertex\n"
     "  gravity X Y Z                 acceleration\n"
     "  release VERTEX | release all  back to the reference condition; all: gravity too\n"
+    "  deadline US | deadline none   what a solve is given from here on, in place of\n"
+    "                                --deadline-us\n"
     "  dt SECONDS                    time that a step takes, 0.001 at the start\n"
     "  step [COUNT]                  solve now, or COUNT times\n"
     "  expect NAME X Y Z TOLERANCE   fail when the probe is further off at the last step\n"

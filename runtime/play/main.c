@@ -78,7 +78,6 @@ static pliant_status play(const pliant_play_options *options, const pliant_model
             .info = &info,
             .threads = options->threads,
             .repeat = options->repeat,
-            .deadline_ns = def.player.deadline_ns,
             .result = &result,
             .compare = pliant_outputs_compared(outputs),
         };

@@ -45,7 +45,7 @@ static const struct option long_options[] = {
     {NULL, 0, NULL, 0},
 };
 
-static const int32_t repeat_limit = 1000000000, deadline_limit = 1000000000;
+static const int32_t repeat_limit = 1000000000;
 
 static pliant_status parse_path(const char *option, const char *text, const char **path,
                                 pliant_error *err)
@@ -78,7 +78,7 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
         // How many levels there are, the model will say.
         return pliant_option_integer("--lod", optarg, 0, INT32_MAX, &o->level, err);
     case OPTION_DEADLINE:
-        return pliant_option_integer("--deadline-us", optarg, 0, deadline_limit, &o->deadline_us,
+        return pliant_option_integer("--deadline-us", optarg, 0, PLIANT_SCRIPT_DEADLINE_LIMIT, &o->deadline_us,
                                      err);
     case OPTION_PASSIVE:
         o->passive = 1;

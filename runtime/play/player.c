@@ -27,9 +27,10 @@ struct pliant_player {
     int32_t *probe_vertex;  // [probe_count]
     pliant_vec3 *probe_u;   // [probe_count]
 
-    double dt;          // s
-    double time_start;  // time when dt last changed, s
-    int64_t dt_steps;   // steps since
+    int64_t deadline_ns;  // of a solve, from its start
+    double dt;            // s
+    double time_start;    // time when dt last changed, s
+    int64_t dt_steps;     // steps since
     pliant_step last;
 };
 
@@ -126,6 +127,7 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
     p->def = *def;
     p->finest = info.level_count - 1;
     p->dt = default_dt;
+    p->deadline_ns = def->deadline_ns;
     p->surface_count = pliant_model_level_vertex_count(model, def->level);
     pliant_status status = PLIANT_OK;
     p->surface = calloc((size_t)p->surface_count + 1, sizeof *p->surface);
@@ -371,7 +373,7 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
                                pliant_error *err)
 {
     pliant_solver *solver = pliant_conditions_solver(player->conditions);
-    const int64_t start = pliant_clock_ns(), given = player->def.deadline_ns;
+    const int64_t start = pliant_clock_ns(), given = player->deadline_ns;
     const pliant_status solved =
         pliant_solver_solve(solver, given < PLIANT_NEVER - start ? start + given : PLIANT_NEVER);
     pliant_status status = solved;
@@ -387,6 +389,7 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
     player->last = (pliant_step){
         .number = player->last.number + 1,
         .time = player->time_start + (double)player->dt_steps * player->dt,
+        .deadline_ns = given,
         .status = solved,
         .total_ns = end - start,
         .report = pliant_solver_last(solver),
@@ -412,6 +415,11 @@ static pliant_status execute_step(pliant_player *player, const pliant_statement 
     return PLIANT_OK;
 }
 
+void pliant_player_set_deadline(pliant_player *player, int64_t deadline_ns)
+{
+    player->deadline_ns = deadline_ns;
+}
+
 pliant_status pliant_player_execute(pliant_player *player, const pliant_statement *statement,
                                     const pliant_observer *observer, pliant_error *err)
 {
@@ -431,6 +439,10 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
         return execute_gravity(player, statement, err);
     case PLIANT_STATEMENT_RELEASE:
         return execute_release(player, statement, err);
+    case PLIANT_STATEMENT_DEADLINE:
+        pliant_player_set_deadline(player,
+                                   statement->count < 0 ? PLIANT_NEVER : 1000 * statement->count);
+        return PLIANT_OK;
     case PLIANT_STATEMENT_DT:
         return execute_dt(player, statement, err);
     case PLIANT_STATEMENT_STEP:

@@ -25,7 +25,7 @@ typedef struct pliant_player_def {
     const char *script_name;       // for messages; borrowed until destroy
     int32_t level;                 // the surface is reconstructed up to this level; default all
     pliant_probe_rule probe_rule;  // default anytime
-    int64_t deadline_ns;           // what every solve is given; default PLIANT_NEVER
+    int64_t deadline_ns;           // what a solve is given at first; default PLIANT_NEVER
     pliant_compliance compliance;  // default as stored
 } pliant_player_def;
 
@@ -40,6 +40,7 @@ typedef struct pliant_probe {
 typedef struct pliant_step {
     int64_t number;        // 1 is the first
     double time;           // s, at the end of the step
+    int64_t deadline_ns;   // what the solve was given, or PLIANT_NEVER
     pliant_status status;  // of the solve: PLIANT_OK or a reduced result (the report tells more)
     int64_t total_ns;      // solve and surface together
     pliant_solver_report report;
@@ -71,6 +72,9 @@ PLIANT_UNUSED_RESULT pliant_status pliant_player_create(const pliant_model *mode
                                                         const pliant_player_def *def,
                                                         pliant_player **player, pliant_error *err);
 void pliant_player_destroy(pliant_player *player);  // NULL is fine
+
+// Give every solve from now on `deadline_ns` nanoseconds, 0 or more, or PLIANT_NEVER.
+void pliant_player_set_deadline(pliant_player *player, int64_t deadline_ns);
 
 // Execute one statement; `step` solves as often as it says. Refusals read
 // "script:line:column: reason" and have no effect on the state; an expectation that is not met is

@@ -20,12 +20,14 @@ static void write_deadline(const pliant_report *report, FILE *stream)
     // Of warm-up, too: a miss is a miss.
     pliant_punctuality p = report->result->timings->punctuality;
     pliant_punctuality_merge(&p, &report->result->warm_up->punctuality);
+    if (p.given_count == 0) return;
+    fprintf(stream, "deadline %.9g", 1e-3 * (double)p.least_given);
+    if (p.most_given > p.least_given) fprintf(stream, " to %.9g", 1e-3 * (double)p.most_given);
     fprintf(stream,
-            "deadline %.9g us: %lld of %lld steps missed it: %lld solved on a coarser level, %lld "
-            "solved too late, worst lateness %.1f us\n",
-            1e-3 * (double)report->deadline_ns, (long long)p.missed_count, (long long)p.step_count,
-            (long long)p.coarser_count, (long long)p.overrun_count,
-            1e-3 * (double)p.worst_lateness_ns);
+            " us: %lld of %lld steps missed it: %lld solved on a coarser level, %lld solved too "
+            "late, worst lateness %.1f us\n",
+            (long long)p.missed_count, (long long)p.given_count, (long long)p.coarser_count,
+            (long long)p.overrun_count, 1e-3 * (double)p.worst_lateness_ns);
     fprintf(stream, "steps by constraint level:");
     for (int l = 0; l < report->info->level_count; l++)
         fprintf(stream, "%s %lld on %d", l ? "," : "", (long long)p.level_counts[l], l);
@@ -94,7 +96,7 @@ void pliant_report_write(const pliant_report *report, FILE *stream)
                 1e-3 * pliant_histogram_percentile(h, 0.99),
                 1e-3 * pliant_histogram_percentile(h, 1));
     }
-    if (report->deadline_ns < PLIANT_NEVER) write_deadline(report, stream);
+    write_deadline(report, stream);
     fprintf(stream, "\n");
     write_probes(player, stream);
     if (report->compare) {

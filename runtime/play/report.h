@@ -12,7 +12,6 @@ typedef struct pliant_report {
     const char *model, *script;  // names as given
     const pliant_model_info *info;
     int32_t threads, repeat;
-    int64_t deadline_ns;                    // PLIANT_NEVER: none
     const pliant_crew_result *result;       // with a player
     const pliant_compare_summary *compare;  // NULL without --compare
 } pliant_report;

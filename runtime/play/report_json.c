@@ -61,12 +61,13 @@ static void put_punctuality(const pliant_report *report, FILE *stream)
     for (int l = 0; l < report->info->level_count; l++)
         fprintf(stream, "%s%lld", l ? "," : "", (long long)p.level_counts[l]);
     fputc(']', stream);
-    if (report->deadline_ns == PLIANT_NEVER) return;
+    if (p.given_count == 0) return;
     fprintf(stream,
-            ",\"deadline\":{\"us\":%.9g,\"misses\":%lld,\"coarser\":%lld,\"overruns\":%lld,"
+            ",\"deadline\":{\"us\":%.9g,\"us_least\":%.9g,\"steps\":%lld,\"misses\":%lld,"
+            "\"coarser\":%lld,\"overruns\":%lld,"
             "\"worst_lateness_us\":%.3f}",
-            1e-3 * (double)report->deadline_ns, (long long)p.missed_count,
-            (long long)p.coarser_count, (long long)p.overrun_count,
+            1e-3 * (double)p.most_given, 1e-3 * (double)p.least_given, (long long)p.given_count,
+            (long long)p.missed_count, (long long)p.coarser_count, (long long)p.overrun_count,
             1e-3 * (double)p.worst_lateness_ns);
 }
 

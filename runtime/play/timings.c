@@ -14,9 +14,22 @@ const char *pliant_phase_name(pliant_phase phase)
     return phase_names[phase];
 }
 
-static void add_punctuality(pliant_punctuality *punctuality, const pliant_solver_report *report)
+static void widen(pliant_punctuality *punctuality, int64_t least, int64_t most)
 {
-    // Of the solve's status too much is left out: a rough solve may be late as well.
+    if (punctuality->given_count == 0 || least < punctuality->least_given)
+        punctuality->least_given = least;
+    if (punctuality->given_count == 0 || most > punctuality->most_given)
+        punctuality->most_given = most;
+}
+
+static void add_punctuality(pliant_punctuality *punctuality, const pliant_step *step)
+{
+    const pliant_solver_report *report = &step->report;
+    if (step->deadline_ns < PLIANT_NEVER) {
+        widen(punctuality, step->deadline_ns, step->deadline_ns);
+        punctuality->given_count++;
+    }
+    // The solve's status leaves things out: a rough solve may be late as well.
     const int is_coarser = report->is_late != 0, is_overrun = report->lateness_ns > 0;
     punctuality->step_count++;
     punctuality->missed_count += is_coarser || is_overrun;
@@ -30,7 +43,9 @@ static void add_punctuality(pliant_punctuality *punctuality, const pliant_solver
 
 void pliant_punctuality_merge(pliant_punctuality *punctuality, const pliant_punctuality *other)
 {
+    if (other->given_count > 0) widen(punctuality, other->least_given, other->most_given);
     punctuality->step_count += other->step_count;
+    punctuality->given_count += other->given_count;
     punctuality->missed_count += other->missed_count;
     punctuality->coarser_count += other->coarser_count;
     punctuality->overrun_count += other->overrun_count;
@@ -48,7 +63,7 @@ void pliant_timings_add(pliant_timings *timings, const pliant_step *step)
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_SUMMATION], report->summation_ns);
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_SURFACE], report->surface_ns);
     pliant_histogram_add(&timings->phases[PLIANT_PHASE_TOTAL], step->total_ns);
-    add_punctuality(&timings->punctuality, report);
+    add_punctuality(&timings->punctuality, step);
     if (step->status == PLIANT_ROUGH) timings->rough_count++;
     if (report->constraint_count > timings->most_constraints)
         timings->most_constraints = report->constraint_count;

@@ -18,6 +18,8 @@ typedef enum pliant_phase {
 // How steps kept their deadline, and on which levels they were solved.
 typedef struct pliant_punctuality {
     int64_t step_count;
+    int64_t given_count;              // steps with a deadline
+    int64_t least_given, most_given;  // ns from the solve's start, of those
     int64_t missed_count;       // steps that missed their deadline, in one of the next two ways
     int64_t coarser_count;      // solved on a coarser level than stated
     int64_t overrun_count;      // solved, on whatever level, after the deadline

@@ -99,6 +99,10 @@ static void every_statement_is_understood(void **state)
     check_near(s.value[2], -9.81, 0);
     assert_int_equal(parse("release 812").vertex.kind, PLIANT_VERTEX_MODEL);
     assert_int_equal(parse("release all").vertex.kind, PLIANT_VERTEX_ALL);
+    assert_int_equal(parse("deadline 200").count, 200);
+    assert_int_equal(parse("deadline 0").count, 0);
+    assert_int_equal(parse("deadline none").count, -1);
+    assert_int_equal(parse("deadline 1000000000").kind, PLIANT_STATEMENT_DEADLINE);
     check_near(parse("dt 1e-3").scalar, 0.001, 0);
     assert_int_equal(parse("step").count, 1);
     assert_int_equal(parse("step 100").count, 100);
@@ -113,7 +117,7 @@ static void mistakes_are_placed_and_explained(void **state)
 {
     (void)state;
     check_refused("shove 1 2 3", "s:7:1: expected probe, displace, traction, force, support, gravity, "
-                                 "release, dt, step or expect, found \"shove\"");
+                                 "release, deadline, dt, step or expect, found \"shove\"");
     check_refused("pliant-script 1", "s:7:1: expected pliant-script as first statement only, found \"pliant-script\"");
     check_refused("displace", "s:7:9: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
     check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"-1\"");
@@ -149,6 +153,10 @@ static void mistakes_are_placed_and_explained(void **state)
     check_refused("step -3", "s:7:6: expected a number of steps, 1 or more, found \"-3\"");
     check_refused("step 9223372036854775808", "s:7:6: expected a number of steps, 1 or more, found \"9223372036854775808\"");
     check_refused("step 2 3", "s:7:8: expected the end of the line, found \"3\"");
+    check_refused("deadline", "s:7:9: expected microseconds, a whole number from 0 to 1000000000, or none, found the end of the line");
+    check_refused("deadline 1.5", "s:7:10: expected microseconds, a whole number from 0 to 1000000000, or none, found \"1.5\"");
+    check_refused("deadline 1000000001", "s:7:10: expected microseconds, a whole number from 0 to 1000000000, or none, found \"1000000001\"");
+    check_refused("deadline none 1", "s:7:15: expected the end of the line, found \"1\"");
     check_refused("dt 0", "s:7:4: expected seconds, a number > 0, found \"0\"");
     check_refused("dt", "s:7:3: expected seconds, a number > 0, found the end of the line");
     check_refused("expect nose 0 0 0", "s:7:18: expected a tolerance, a number >= 0, found the end of the line");

@@ -23,6 +23,7 @@ static const char *const seeds[] = {
     "\xef\xbb\xbfpliant-script 1\nforce near 1 2 3 0 0 -3\nsupport 30 0 0 0.01\ngravity 0 0 "
     "-9.81\ndt 1e-3\n",
     "pliant-script 1\ndisplace 1:near 0 1 2 0 0 1\nprobe p vertex 0:source 7\nrelease 2:5\n",
+    "pliant-script 1\ndeadline 200\nstep\ndeadline none\n",
     "pliant-script 1\nrelease 812\nrelease all\nexpect nose 0 0 -0.02 1e-3\n\n# \xc3\xa4\n",
     "pliant-script 2\n",
     "step x\nrelease\ndt -1\nexpect a,b\ngravity nan inf 1e999\n",
@@ -55,6 +56,7 @@ static void check_statement(const pliant_statement *s)
     if (!memchr(s->name, 0, sizeof s->name)) abort();
     if ((s->kind == PLIANT_STATEMENT_STEP || s->kind == PLIANT_STATEMENT_VERSION) && s->count < 1)
         abort();
+    if (s->kind == PLIANT_STATEMENT_DEADLINE && (s->count < -1 || s->count > 1000000000)) abort();
     if (s->kind == PLIANT_STATEMENT_DT && !(s->scalar > 0)) abort();
 }
 

@@ -161,7 +161,7 @@ static void help_and_version_go_to_standard_output(void **state)
     const char *const statements[] = {"pliant-script 1", "probe NAME",   "displace VERTEX",
                                       "traction VERTEX", "force VERTEX", "support VERTEX",
                                       "gravity X Y Z",   "release all",  "dt SECONDS",
-                                      "step [COUNT]",    "expect NAME"};
+                                      "step [COUNT]",    "expect NAME", "deadline US"};
     for (size_t i = 0; i < sizeof statements / sizeof *statements; i++)
         check_contains(out, statements[i]);
     check_run(0, "$P --help --unknown");
@@ -799,7 +799,7 @@ static void missed_deadlines_are_told_and_are_no_failure(void **state)
     for (int i = 0; i < 6; i++) assert_int_equal(levels[i] < 2, i >= 1 && i <= 3);
 
     check_run(0, "$P --json --deadline-us 0 model.h5 many.script");
-    check_contains(out, "\"deadline\":{\"us\":0,\"misses\":6,\"coarser\":3,\"overruns\":6,"
+    check_contains(out, "\"deadline\":{\"us\":0,\"us_least\":0,\"steps\":6,\"misses\":6,\"coarser\":3,\"overruns\":6,"
                         "\"worst_lateness_us\":");
     check_contains(out, ",\"level_steps\":[");
     check_run(0, "$P --json --deadline-us 0 model.h5 <many.script");
@@ -813,6 +813,13 @@ static void missed_deadlines_are_told_and_are_no_failure(void **state)
                         "steps by constraint level: 0 on 0, 0 on 1, 6 on 2\n");
     check_run(0, "$P model.h5 many.script");
     assert_null(strstr(out, "deadline"));
+    // The script's own word holds from where it stands.
+    write_text("some.script", "pliant-script 1\nstep 2\ndeadline 900000000\nstep\ndeadline "
+                              "1000000\nstep 2\ndeadline none\nstep 5\n");
+    check_run(0, "$P --deadline-us 500000 model.h5 some.script");
+    check_contains(out, "\ndeadline 500000 to 900000000 us: 0 of 5 steps missed it: ");
+    check_run(0, "$P --json model.h5 some.script; rm some.script");
+    check_contains(out, "\"deadline\":{\"us\":900000000,\"us_least\":1000000,\"steps\":3,\"misses\":0,");
     // Every pass counts, the first ones too.
     check_run(0, "$P --repeat 3 --threads 2 --deadline-us 0 model.h5 many.script");
     check_contains(out, "\ndeadline 0 us: 36 of 36 steps missed it: 18 solved on a coarser level, ");

@@ -8,9 +8,10 @@
 
 #include <stddef.h>
 
-#define PLIANT_SCRIPT_VERSION     1
-#define PLIANT_SCRIPT_NAME_LIMIT  64    // bytes of a probe's name, with its end
-#define PLIANT_SCRIPT_LINE_LIMIT  4096  // bytes of a line
+#define PLIANT_SCRIPT_VERSION        1
+#define PLIANT_SCRIPT_NAME_LIMIT     64          // bytes of a probe's name, with its end
+#define PLIANT_SCRIPT_LINE_LIMIT     4096        // bytes of a line
+#define PLIANT_SCRIPT_DEADLINE_LIMIT 1000000000  // microseconds
 
 typedef enum pliant_statement_kind {
     PLIANT_STATEMENT_NONE,      // blank or comment
@@ -22,6 +23,7 @@ typedef enum pliant_statement_kind {
     PLIANT_STATEMENT_SUPPORT,   // support VERTEX X Y Z
     PLIANT_STATEMENT_GRAVITY,   // gravity X Y Z
     PLIANT_STATEMENT_RELEASE,   // release VERTEX | release all
+    PLIANT_STATEMENT_DEADLINE,  // deadline MICROSECONDS | deadline none
     PLIANT_STATEMENT_DT,        // dt SECONDS
     PLIANT_STATEMENT_STEP,      // step [COUNT]
     PLIANT_STATEMENT_EXPECT,    // expect NAME X Y Z TOLERANCE
@@ -52,7 +54,7 @@ typedef struct pliant_statement {
     pliant_vertex_name vertex;
     double value[3];             // finite
     double scalar;               // tolerance of expect, seconds of dt; finite
-    int64_t count;               // of step; version of pliant-script
+    int64_t count;               // of step; version of pliant-script; microseconds, -1: none
 } pliant_statement;
 
 typedef struct pliant_script pliant_script;  // an open script: a stream, its name and line number
