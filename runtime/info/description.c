@@ -84,18 +84,20 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
     fprintf(stream, "domains     %d free, %d fixed\n", (int)v->free_count, (int)v->fixed_count);
 }
 
-static void print_level(pliant_block_name block, int32_t level, const pliant_greens_view *g,
-                        FILE *stream)
+static void print_level(const pliant_model_view *v, pliant_block_name block, int32_t level, FILE *stream)
 {
+    const pliant_greens_view *g = &v->greens[block][level];
     const double *s = g->summary;
-    char eps[32] = "targets", size[16];
+    char eps[32] = "targets", smallest[32] = "-", size[16];
     if (s[PLIANT_SUMMARY_EPS] != 0) snprintf(eps, sizeof eps, "%g", s[PLIANT_SUMMARY_EPS]);
+    if (s[PLIANT_SUMMARY_DEFINITE] != 0)
+        snprintf(smallest, sizeof smallest, "%.3g", s[PLIANT_SUMMARY_DEFINITE]);
     write_bytes(pliant_description_level_bytes(g), size);
     fprintf(stream,
-            "            %-11s  %5d  %7d  %9" PRIu64
-            "  %7s  %6.3gx  %7s  %7.3g  %7.3g  %s, %s, %s\n",
-            pliant_block_text(block), (int)level, (int)g->column_count, g->nnz, size,
-            s[PLIANT_SUMMARY_FACTOR], eps, s[PLIANT_SUMMARY_RMS], s[PLIANT_SUMMARY_MAX],
+            "            %-11s  %5d  %8d  %7d  %9" PRIu64
+            "  %7s  %6.3gx  %7s  %7.3g  %7.3g  %8s  %s, %s, %s\n",
+            pliant_block_text(block), (int)level, (int)v->level_vertex_count[level], (int)g->column_count,
+            g->nnz, size, s[PLIANT_SUMMARY_FACTOR], eps, s[PLIANT_SUMMARY_RMS], s[PLIANT_SUMMARY_MAX], smallest,
             s[PLIANT_SUMMARY_WAVELET] == PLIANT_BUTTERFLY ? "butterfly" : "linear",
             s[PLIANT_SUMMARY_LIFTED] == PLIANT_LIFTED ? "lifted" : "unlifted",
             s[PLIANT_SUMMARY_BOUNDARY] == PLIANT_DROP ? "drop" : "zero");
@@ -103,12 +105,13 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
 
 static void print_greens(const pliant_model_view *v, FILE *stream)
 {
-    fprintf(stream, "%-12s%-11s  %5s  %7s  %9s  %7s  %7s  %7s  %7s  %7s  %s\n", "greens", "block",
-            "level", "columns", "stored", "size", "factor", "eps", "rms", "max", "wavelet");
+    fprintf(stream, "%-12s%-11s  %5s  %8s  %7s  %9s  %7s  %7s  %7s  %7s  %7s  %8s  %s\n", "greens",
+            "block", "level", "vertices", "columns", "stored", "size", "factor", "eps", "rms", "max",
+            "smallest", "wavelet");
     for (pliant_block_name block = PLIANT_FREE_FREE; block < PLIANT_BLOCK_COUNT; block++)
         for (int32_t level = 0; level < v->level_count; level++)
             if (v->greens[block][level].column_offset)
-                print_level(block, level, &v->greens[block][level], stream);
+                print_level(v, block, level, stream);
     fprintf(stream, "gravity     free%s\n", v->gravity_fixed ? ", fixed" : "");
 }
 
@@ -144,6 +147,24 @@ static void print_provenance(const pliant_contents *contents, FILE *stream)
         if (pair.key_bytes > 0) fputs(" = ", stream);
         print_text(pair.value, pair.value_bytes, stream);
         fputc('\n', stream);
+    }
+}
+
+void pliant_description_print_verified(const pliant_contents *contents, const pliant_definiteness *verified,
+                                       FILE *stream)
+{
+    const char *looked_at = contents->kind == PLIANT_CONTENTS_MODEL   ? ", indices and levels"
+                            : contents->kind == PLIANT_CONTENTS_DENSE ? " and indices"
+                                                                      : "";
+    fprintf(stream, "verified: %" PRId32 " sections, %" PRIu64 " bytes: checksums%s\n",
+            pliant_reader_section_count(contents->reader), pliant_reader_size(contents->reader), looked_at);
+    for (int32_t l = 0; contents->kind == PLIANT_CONTENTS_MODEL && l < contents->model.level_count; l++) {
+        const pliant_lanczos_result *level = &verified->levels[l];
+        if (level->steps == 0) continue;
+        const double stored = contents->model.greens[PLIANT_FREE_FREE][l].summary[PLIANT_SUMMARY_DEFINITE];
+        fprintf(stream, "contact compliance, level %d: smallest eigenvalue ratio %.3g (%.6g of %.6g%s)\n", (int)l,
+                pliant_definiteness_ratio(level), level->smallest, level->largest,
+                stored != 0 ? ", as stored" : "");
     }
 }
 

@@ -1,15 +1,19 @@
 // description.h: what is in a file, as text for people or as JSON.
 #pragma once
 
-#include "contents.h"
+#include "definiteness.h"
 
 #include <stdio.h>
 
 // Both write to `stream`; its error state tells whether that worked.
 void pliant_description_print(const pliant_contents *contents, FILE *stream);
 
-// `verified` 1: --verify has passed, which the text then says.
-void pliant_description_print_json(const pliant_contents *contents, int verified, FILE *stream);
+// `verified`: what --verify has found, which the text then says; NULL: it was not asked for.
+void pliant_description_print_json(const pliant_contents *contents, const pliant_definiteness *verified,
+                                   FILE *stream);
+// --verify has passed: what was looked at, and how definite the model's contact compliance is.
+void pliant_description_print_verified(const pliant_contents *contents, const pliant_definiteness *verified,
+                                       FILE *stream);
 
 // The numbers that both show, of a model.
 typedef struct pliant_mesh_facts {

@@ -66,9 +66,10 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
             (int)v->fixed_count);
 }
 
-static void print_level(pliant_block_name block, int32_t level, const pliant_greens_view *g,
-                        FILE *stream)
+static void print_level(const pliant_model_view *v, pliant_block_name block, int32_t level,
+                        const pliant_definiteness *verified, FILE *stream)
 {
+    const pliant_greens_view *g = &v->greens[block][level];
     static const struct {
         const char *name;
         pliant_summary_item item;
@@ -80,13 +81,26 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
     };
     const double *s = g->summary;
     fprintf(stream,
-            "{\"block\": \"%s\", \"level\": %d, \"rows\": %d, \"columns\": %d, \"nnz\": %" PRIu64
-            ", \"bytes\": %" PRIu64,
-            pliant_block_text(block), (int)level, (int)g->row_count, (int)g->column_count, g->nnz,
-            pliant_description_level_bytes(g));
+            "{\"block\": \"%s\", \"level\": %d, \"vertices\": %d, \"rows\": %d, \"columns\": %d"
+            ", \"nnz\": %" PRIu64 ", \"bytes\": %" PRIu64,
+            pliant_block_text(block), (int)level, (int)v->level_vertex_count[level], (int)g->row_count,
+            (int)g->column_count, g->nnz, pliant_description_level_bytes(g));
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
         fprintf(stream, ", \"%s\": ", numbers[i].name);
         print_number(s[numbers[i].item], stream);
+    }
+    fputs(", \"smallest_eigenvalue\": ", stream);
+    if (s[PLIANT_SUMMARY_DEFINITE] != 0) print_number(s[PLIANT_SUMMARY_DEFINITE], stream);
+    else fputs("null", stream);
+    if (verified && block == PLIANT_FREE_FREE && verified->levels[level].steps > 0) {
+        const pliant_lanczos_result *found = &verified->levels[level];
+        fputs(", \"verified\": {\"smallest_eigenvalue\": ", stream);
+        print_number(found->smallest, stream);
+        fputs(", \"largest_eigenvalue\": ", stream);
+        print_number(found->largest, stream);
+        fputs(", \"eigenvalue_ratio\": ", stream);
+        print_number(pliant_definiteness_ratio(found), stream);
+        fputs("}", stream);
     }
     fprintf(stream, ", \"wavelet\": \"%s\", \"lifted\": %s, \"boundary\": \"%s\"}",
             s[PLIANT_SUMMARY_WAVELET] == PLIANT_BUTTERFLY ? "butterfly" : "linear",
@@ -94,7 +108,7 @@ static void print_level(pliant_block_name block, int32_t level, const pliant_gre
             s[PLIANT_SUMMARY_BOUNDARY] == PLIANT_DROP ? "drop" : "zero");
 }
 
-static void print_greens(const pliant_model_view *v, FILE *stream)
+static void print_greens(const pliant_model_view *v, const pliant_definiteness *verified, FILE *stream)
 {
     const char *separator = "\n    ";
     fputs(",\n  \"blocks\": [", stream);
@@ -102,7 +116,7 @@ static void print_greens(const pliant_model_view *v, FILE *stream)
         for (int32_t level = 0; level < v->level_count; level++) {
             if (!v->greens[block][level].column_offset) continue;
             fputs(separator, stream);
-            print_level(block, level, &v->greens[block][level], stream);
+            print_level(v, block, level, verified, stream);
             separator = ",\n    ";
         }
     fprintf(stream, "],\n  \"gravity\": [\"free\"%s]", v->gravity_fixed ? ", \"fixed\"" : "");
@@ -152,7 +166,8 @@ static void print_sections(const pliant_reader *reader, FILE *stream)
     fputs("]", stream);
 }
 
-void pliant_description_print_json(const pliant_contents *contents, int verified, FILE *stream)
+void pliant_description_print_json(const pliant_contents *contents, const pliant_definiteness *verified,
+                                   FILE *stream)
 {
     const char *name = pliant_reader_name(contents->reader);
     fputs("{\n  \"file\": ", stream);
@@ -163,7 +178,7 @@ void pliant_description_print_json(const pliant_contents *contents, int verified
     if (verified) fputs(", \"verified\": true", stream);
     if (contents->kind == PLIANT_CONTENTS_MODEL) {
         print_mesh(&contents->model, stream);
-        print_greens(&contents->model, stream);
+        print_greens(&contents->model, verified, stream);
     } else if (contents->kind == PLIANT_CONTENTS_DENSE) {
         fprintf(stream, ",\n  \"domains\": {\"free\": %d, \"fixed\": %d}",
                 (int)contents->dense.free_count, (int)contents->dense.fixed_count);

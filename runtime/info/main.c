@@ -5,7 +5,6 @@
 #include "options.h"
 
 #include <errno.h>
-#include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,20 +23,20 @@ static int run(const pliant_info_options *options)
     pliant_contents contents;
     if (pliant_contents_open(options->path, &contents, &err) < 0) return refuse(EXIT_FAILED, &err);
     int status = EXIT_DONE;
+    pliant_definiteness definiteness = {.levels = {{.steps = 0}}};
     if (options->verify && pliant_contents_verify(&contents, &err) < 0) status = EXIT_FAILED;
+    if (options->verify && status == EXIT_DONE && contents.kind == PLIANT_CONTENTS_MODEL &&
+        pliant_definiteness_measure(&contents, &definiteness, &err) < 0)
+        status = EXIT_FAILED;
     if (status == EXIT_DONE && options->output) {
         const pliant_status done =
             pliant_mesh_export(&contents, options->output, options->level, &err);
         if (done < 0) status = done == PLIANT_ERR_ARGUMENT ? EXIT_MISUSED : EXIT_FAILED;
     }
     if (status != EXIT_DONE) refuse(status, &err);
-    else if (options->json) pliant_description_print_json(&contents, options->verify, stdout);
-    else if (options->verify)
-        printf("verified: %" PRId32 " sections, %" PRIu64 " bytes: checksums%s\n",
-               pliant_reader_section_count(contents.reader), pliant_reader_size(contents.reader),
-               contents.kind == PLIANT_CONTENTS_MODEL   ? ", indices and levels"
-               : contents.kind == PLIANT_CONTENTS_DENSE ? " and indices"
-                                                        : "");
+    else if (options->json)
+        pliant_description_print_json(&contents, options->verify ? &definiteness : NULL, stdout);
+    else if (options->verify) pliant_description_print_verified(&contents, &definiteness, stdout);
     else if (!options->output) pliant_description_print(&contents, stdout);
     pliant_contents_close(&contents);
     return status;

@@ -124,8 +124,9 @@ static void model_is_described(void **state)
     check_contains(a->text, "6 vertices of the input, 60 made by subdivision\n");
     check_contains(a->text, "material    Young's modulus 1000, Poisson's ratio 0.3, density 1\n");
     check_contains(a->text, "domains     53 free, 13 fixed\n");
-    check_contains(a->text, "free-free        2       53        937  37.9 kB       3x     0.05    0.015     0.04  butterfly, lifted, zero\n");
-    check_contains(a->text, "fixed-fixed      2       13 ");
+    check_contains(a->text, "free-free        2        66       53        937  37.9 kB       3x     0.05    0.015     0.04         -  "
+                            "butterfly, lifted, zero\n");
+    check_contains(a->text, "fixed-fixed      2        66       13 ");
     check_contains(a->text, "gravity     free, fixed\n");
     check_contains(a->text, "program = pliant-precompute 0.1.0\n");
     check_contains(a->text, "place = Z\xc3\xbcrich \"quoted\"\n");
@@ -162,13 +163,70 @@ static void json_is_json_and_keeps_quotes_and_names(void **state)
     check_answer(a, 0, "na \\\"me\\\\\\ufffd.h5\",");
     check_contains(a->text, "\"place\": \"Z\xc3\xbcrich \\\"quoted\\\"\"");
     check_contains(a->text, "\"domains\": {\"free\": 13, \"fixed\": 5}");
-    check_contains(a->text, "\"block\": \"fixed-free\", \"level\": 1, \"rows\": 5, \"columns\": 13");
+    check_contains(a->text, "\"block\": \"fixed-free\", \"level\": 1, \"vertices\": 18, \"rows\": 5, \"columns\": 13");
+    check_contains(a->text, "\"smallest_eigenvalue\": null, \"wavelet\"");
     check_contains(a->text, "\"wavelet\": \"butterfly\", \"lifted\": true, \"boundary\": \"zero\"");
     assert_null(strstr(a->text, "verified"));
     check_json(a->text);
     a = ask_about("--json --verify", scratch("na \"me\\\xff.h5"));
     check_answer(a, 0, "\"verified\": true");
+    check_contains(a->text, "\"verified\": {\"smallest_eigenvalue\": ");
     check_json(a->text);
+}
+
+// The same model with another number stored as its smallest eigenvalue.
+static const char *write_definite(const char *name, double smallest)
+{
+    pliant_error err;
+    tiny_file file;
+    const char *path = scratch(name);
+    tiny_model_make(2, 0, &file);
+    ((double *)tiny_find(&file, "/greens/free-free/level1/summary")->data)[PLIANT_SUMMARY_DEFINITE] = smallest;
+    check_ok(tiny_write(&file, path, &err), &err);
+    tiny_free(&file);
+    return path;
+}
+
+// Against the eigenvalues of the dense matrix: tests/common/test_compliance.c.
+static void verify_finds_the_smallest_eigenvalue_and_compares_it(void **state)
+{
+    (void)state;
+    const answer *a = ask_about("--verify", write_definite("definite.h5", 0));
+    check_answer(a, 0, "contact compliance, level 1: smallest eigenvalue ratio ");
+    double ratio, smallest, largest;
+    const char *line = strstr(a->text, "ratio ");
+    assert_int_equal(sscanf(line, "ratio %lf (%lf of %lf)", &ratio, &smallest, &largest), 3);
+    // Blocks of sines: far from definite, and their diagonal is 1, so that eigenvalues of both signs
+    // add up to the number of rows.
+    assert_true(smallest < -0.1 && largest > 1);
+    assert_true(fabs(ratio - smallest / largest) < 0.01 * fabs(ratio));
+    assert_null(strstr(a->text, "as stored"));
+
+    check_answer(ask_about("--verify", write_definite("definite.h5", smallest)), 0, ", as stored)\n");
+    char shown[64];
+    snprintf(shown, sizeof shown, "  %8.3g  butterfly", smallest);
+    check_answer(ask_about("", scratch("definite.h5")), 0, shown);
+    a = ask_about("--json", scratch("definite.h5"));
+    line = strstr(a->text, "\"smallest_eigenvalue\": ");
+    assert_non_null(line);
+    assert_true(fabs(strtod(line + 23, NULL) - smallest) < 1e-12);
+    assert_null(strstr(a->text, "verified"));
+    check_answer(ask_about("--verify", write_definite("definite.h5", smallest + 0.1)), 1,
+                 "definite.h5: /greens/free-free/level1: smallest eigenvalue: expected ");
+    check_answer(ask_about("", scratch("definite.h5")), 0, "Pliant model");
+}
+
+static void a_mesh_without_area_is_found_by_verify(void **state)
+{
+    (void)state;
+    pliant_error err;
+    tiny_file file;
+    const char *path = scratch("flat.h5");
+    tiny_model_make(2, 0, &file);
+    memset(tiny_find(&file, "/mesh/vertices")->data, 0, tiny_find(&file, "/mesh/vertices")->bytes);
+    check_ok(tiny_write(&file, path, &err), &err);
+    tiny_free(&file);
+    check_answer(ask_about("--verify", path), 1, "flat.h5: /mesh: vertex 0: expected an area above 0, found 0");
 }
 
 static void damage_is_found_by_verify_alone(void **state)
@@ -320,6 +378,8 @@ int main(void)
         cmocka_unit_test(model_is_described),
         cmocka_unit_test(dense_and_other_files_are_described),
         cmocka_unit_test(json_is_json_and_keeps_quotes_and_names),
+        cmocka_unit_test(verify_finds_the_smallest_eigenvalue_and_compares_it),
+        cmocka_unit_test(a_mesh_without_area_is_found_by_verify),
         cmocka_unit_test(damage_is_found_by_verify_alone),
         cmocka_unit_test(wrong_topology_is_found_by_verify),
         cmocka_unit_test(levels_are_exported_as_obj_and_ply),
