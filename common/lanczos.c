@@ -15,12 +15,13 @@
 // Looks at the eigenvalues are a few hundred operations a step: worth one after every eighth more
 // steps, and the first when there is something to see.
 static const int32_t first_look = 16, looks_per_doubling = 8;
+// A rest under this part of the operator's size is rounding.
+static const double rounding = 8 * DBL_EPSILON;
 
 typedef struct work {
     pliant_arena arena;
     double *previous, *current, *image, *spare;  // [n]
     double *diagonal, *side;  // [step_capacity]: T; side[i] couples i and i + 1
-    double *pivot;            // [step_capacity]
 } work;
 
 static void lay_out(const pliant_lanczos_def *def, work *w)
@@ -31,7 +32,6 @@ static void lay_out(const pliant_lanczos_def *def, work *w)
     PLIANT_TAKE(&w->arena, w->spare, def->n);
     PLIANT_TAKE(&w->arena, w->diagonal, def->step_capacity);
     PLIANT_TAKE(&w->arena, w->side, def->step_capacity);
-    PLIANT_TAKE(&w->arena, w->pivot, def->step_capacity);
 }
 
 static double dot(const double *x, const double *y, int32_t n)
@@ -97,35 +97,30 @@ static double smallest_of(const work *w, int32_t k, double sign)
     }
 }
 
-// |last component| of the unit eigenvector of sign T that belongs to its smallest eigenvalue: times
-// the next side entry it is the residual. All pivots in front of the last are positive there, so the
-// eigenvector follows backwards from x_i = - side_i / pivot_i x_{i+1} without cancellation.
-static double last_component(const work *w, int32_t k, double sign, double value)
+// The smallest residual that T knows for `value`. With x_i = 1 and the others backwards from
+// x_{h-1} = - side_{h-1} / pivot_{h-1} x_h, the pivots being those of T - value I, the first i basis
+// vectors make a vector whose residual is (pivot_i^2 + side_i^2)^1/2 over the norm of x. Any i will do;
+// the best one counts, since behind it there may be unfinished copies.
+static double residual_of(const work *w, int32_t k, double value)
 {
-    double *pivot = w->pivot;
+    double square = 1, pivot = 1, best = INFINITY;  // of x's norm
     for (int32_t i = 0; i < k; i++) {
-        const double side = i > 0 ? w->side[i - 1] : 0;
-        pivot[i] = sign * w->diagonal[i] - value - (i > 0 ? side * side / pivot[i - 1] : 0);
-        if (fabs(pivot[i]) < DBL_MIN) pivot[i] = DBL_MIN;
+        const double before = i > 0 ? w->side[i - 1] : 0, ratio = before / pivot;
+        square = i > 0 ? 1 + ratio * ratio * square : 1;
+        pivot = w->diagonal[i] - value - before * ratio;
+        if (fabs(pivot) < DBL_MIN) pivot = DBL_MIN;
+        best = fmin(best, hypot(pivot, w->side[i]) / sqrt(square));
     }
-    // Components relative to the last grow: keep their square sum relative to the largest so far.
-    double component = 1, sum = 1;
-    for (int32_t i = k - 1; i-- > 0;) {
-        component *= -w->side[i] / pivot[i];
-        sum += component * component;
-        if (sum > 0x1p500) return 0;
-    }
-    return 1 / sqrt(sum);
+    return best;
 }
 
 static void look(const work *w, int32_t k, pliant_lanczos_result *result)
 {
-    const double next = w->side[k - 1];
     result->steps = k;
     result->smallest = smallest_of(w, k, 1);
     result->largest = -smallest_of(w, k, -1);
-    result->smallest_residual = next * last_component(w, k, 1, result->smallest);
-    result->largest_residual = next * last_component(w, k, -1, -result->largest);
+    result->smallest_residual = residual_of(w, k, result->smallest);
+    result->largest_residual = residual_of(w, k, result->largest);
 }
 
 pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanczos_result *result,
@@ -142,7 +137,7 @@ pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanc
 
     const int32_t n = def->n;
     start(n, w.current);
-    double side = 0;
+    double side = 0, size = 0;  // of T, to rounding
     int32_t next_look = first_look;
     for (int32_t k = 0; k < def->step_capacity; k++) {
         memcpy(w.spare, w.current, (size_t)n * sizeof *w.spare);
@@ -158,7 +153,8 @@ pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanc
             break;
         }
         // A vanishing rest: the vectors so far span all that the start leans on.
-        const int is_done = side <= DBL_EPSILON * fabs(diagonal) || k + 1 == def->step_capacity;
+        size = fmax(size, fabs(diagonal) + side);
+        const int is_done = side <= rounding * size || k + 1 == def->step_capacity;
         if (is_done || k + 1 >= next_look) {
             look(&w, k + 1, result);
             if (is_done || fmax(result->smallest_residual, result->largest_residual) <= def->tolerance) break;

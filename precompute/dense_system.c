@@ -28,6 +28,12 @@ static int32_t split(int64_t count, int rank, int size)
     return (int32_t)(count * rank / size);
 }
 
+// A batch needs no more room than there are columns; gravity is one.
+static int32_t at_once(int32_t columns, int32_t batch)
+{
+    return columns < 1 ? 1 : columns < batch ? columns : batch;
+}
+
 // Collective.
 static PetscErrorCode choose_kind(MPI_Comm comm, int32_t n, dense_kind *kind)
 {
@@ -53,6 +59,7 @@ PetscErrorCode pliant_dense_system_plan(MPI_Comm comm, int32_t n, int32_t column
     PetscFunctionBegin;
     dense_kind kind;
     PetscCall(choose_kind(comm, n, &kind));
+    batch = at_once(columns, batch);
     const double rows = 3.0 * n, matrix = rows * rows * sizeof(double);
     const double column = rows * 3 * sizeof(double);
     *plan = (pliant_dense_plan){.kind = kind == NODE ? "node" : "scalapack",
@@ -72,7 +79,7 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t colu
     s->comm = comm;
     s->n = n;
     s->columns = columns;
-    s->batch = batch;
+    s->batch = at_once(columns, batch);
     s->matrix.file = s->right.file = s->solution.file = -1;
     PetscCallMPI(MPI_Comm_rank(comm, &s->rank));
     PetscCallMPI(MPI_Comm_size(comm, &s->size));
@@ -81,12 +88,12 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t colu
     PetscCall(choose_kind(comm, n, &s->kind));
 
     const size_t rows = 3 * (size_t)n, own_rows = 3 * (size_t)(s->row_end - s->row_begin);
-    const size_t at_once = 3 * (size_t)batch;
+    const size_t columns_at_once = 3 * (size_t)s->batch;
     if (s->kind == NODE) {
         int a, r, x;
         PetscCall(pliant_node_memory_create(comm, rows * rows * sizeof(double), &s->matrix, &a));
-        PetscCall(pliant_node_memory_create(comm, rows * at_once * sizeof(double), &s->right, &r));
-        PetscCall(pliant_node_memory_create(comm, rows * at_once * sizeof(double), &s->solution, &x));
+        PetscCall(pliant_node_memory_create(comm, rows * columns_at_once * sizeof(double), &s->right, &r));
+        PetscCall(pliant_node_memory_create(comm, rows * columns_at_once * sizeof(double), &s->solution, &x));
         if (!a || !r || !x) {
             // No shared memory between these ranks (a locked-down container, say): go without.
             pliant_node_memory_destroy(&s->matrix);
@@ -100,8 +107,8 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t colu
     } else {
         PetscCall(MatCreateDense(comm, (PetscInt)own_rows, (PetscInt)own_rows, (PetscInt)rows,
                                  (PetscInt)rows, NULL, &s->A));
-        PetscCall(PetscMalloc1(rows * (at_once / s->size + 3), &s->received));
-        PetscCall(PetscMalloc1(rows * (at_once / s->size + 3), &s->whole));
+        PetscCall(PetscMalloc1(rows * (columns_at_once / s->size + 3), &s->received));
+        PetscCall(PetscMalloc1(rows * (columns_at_once / s->size + 3), &s->whole));
     }
     PetscCall(PetscCalloc1(own_rows * 3 * (size_t)columns, &s->right_sides));
     PetscCall(PetscCalloc1(own_rows * 3, &s->gravity));

@@ -51,11 +51,12 @@ static void exact(const block *b, int32_t i, int32_t j, double value[9])
         for (int d = 0; d < 3; d++) value[3 * c + d] = lift * ((c == d) + r[c] * r[d] / square) / size;
 }
 
-static pliant_compression *compress(const block *b, pliant_compression_def def, pliant_compression_result *result)
+static pliant_compression *compress_in(const block *b, pliant_compression_def def, const char *folder,
+                                       pliant_compression_result *result)
 {
     pliant_compression *c = NULL;
     pliant_error err;
-    check_ok(pliant_compression_create(b->wavelet, &def, "/tmp", &c, &err), &err);
+    check_ok(pliant_compression_create(b->wavelet, &def, folder, &c, &err), &err);
     for (int32_t first = 0; first < b->m; first += group) {
         const int32_t count = b->m - first < group ? b->m - first : group;
         double *x = pliant_compression_group(c);
@@ -73,6 +74,11 @@ static pliant_compression *compress(const block *b, pliant_compression_def def, 
     }
     check_ok(pliant_compression_decide(c, MPI_COMM_SELF, result, &err), &err);
     return c;
+}
+
+static pliant_compression *compress(const block *b, pliant_compression_def def, pliant_compression_result *result)
+{
+    return compress_in(b, def, "/tmp", result);
 }
 
 // GF-70 and GF-71 of the stored columns, the slow way. Counts blocks too.
@@ -221,6 +227,46 @@ static void papers_rule_keeps_exactly_the_blocks_above_its_threshold(void **stat
     free_block(&b);
 }
 
+// The paper's rule decides at once; a spool beside it changes nothing and has the exact columns.
+static void a_spool_beside_the_papers_rule_holds_the_columns(void **state)
+{
+    (void)state;
+    block b = make_block(pliant_wavelet_default());
+    pliant_compression_result with, without;
+    pliant_compression *c = compress(&b, (pliant_compression_def){.eps = 0.1}, &with);
+    pliant_compression *d = compress_in(&b, (pliant_compression_def){.eps = 0.1}, NULL, &without);
+    assert_true(with.kept == without.kept);
+    check_near(with.rms, without.rms, 0);
+    check_near(with.max, without.max, 0);
+    assert_null(pliant_compression_spool(d));
+    const pliant_spool *spool = pliant_compression_spool(c);
+    assert_int_equal(pliant_spool_column_count(spool), b.m);
+    double *x = calloc(((size_t)b.m + 1) * 9, sizeof *x);
+    for (int32_t j = 0; j < b.m; j += 29) {
+        const pliant_spooled column = pliant_spool_column(spool, j);
+        assert_int_equal(column.column, j);
+        memset(x, 0, ((size_t)b.m + 1) * 9 * sizeof *x);
+        for (int32_t q = 0; q < column.count; q++)
+            for (int e = 0; e < 9; e++) x[9 * column.rows[q] + e] = column.blocks[9 * q + e];
+        pliant_wavelet_inverse(b.wavelet, b.wavelet->level_count - 1, 9, x);
+        for (int32_t i = 0; i < b.m; i++) {
+            double value[9];
+            exact(&b, i, j, value);
+            for (int e = 0; e < 9; e++) check_near(x[9 * i + e], value[e], 1e-6 * column.peak);
+        }
+    }
+    free(x);
+    // What was decided stays when the rest is freed.
+    const uint64_t kept = pliant_compression_kept(c)->count;
+    pliant_compression_settle(c);
+    assert_null(pliant_compression_spool(c));
+    assert_true(pliant_compression_kept(c)->count == kept && kept == with.kept);
+    check_report(&b, c, &with);
+    pliant_compression_destroy(d);
+    pliant_compression_destroy(c);
+    free_block(&b);
+}
+
 static void a_spool_that_cannot_be_made_is_refused_with_its_folder(void **state)
 {
     (void)state;
@@ -242,6 +288,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(targets_are_met_and_not_wasted),
         cmocka_unit_test(both_criteria_keep_less_than_the_papers_rule_at_its_errors),
         cmocka_unit_test(papers_rule_keeps_exactly_the_blocks_above_its_threshold),
+        cmocka_unit_test(a_spool_beside_the_papers_rule_holds_the_columns),
         cmocka_unit_test(a_spool_that_cannot_be_made_is_refused_with_its_folder),
     };
     const int failed = cmocka_run_group_tests(tests, NULL, NULL);

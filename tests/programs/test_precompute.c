@@ -3,6 +3,7 @@
 #include "command.h"
 
 #include "pliant/dense_view.h"
+#include "pliant/hats.h"
 #include "pliant/mesh.h"
 #include "pliant/model_view.h"
 #include "pliant/wavelet.h"
@@ -54,7 +55,9 @@ static opened open_model(const char *path)
     o.areas = malloc((size_t)v->vertex_count * sizeof *o.areas);
     pliant_mesh_vertex_areas(v->vertex_count, v->vertices, v->face_count, v->faces, o.areas);
     for (int d = 0; d < 2; d++) {
-        const double *s = v->greens[d ? PLIANT_FIXED_FREE : PLIANT_FREE_FREE][v->level_count - 1].summary;
+        const double *s = NULL;
+        for (int32_t l = 0; l < v->level_count && !s; l++)
+            s = v->greens[d ? PLIANT_FIXED_FREE : PLIANT_FREE_FREE][l].summary;
         if (!s) continue;
         const pliant_wavelet_def def = {(pliant_wavelet_scheme)s[PLIANT_SUMMARY_WAVELET],
                                         (pliant_wavelet_lifting)s[PLIANT_SUMMARY_LIFTED],
@@ -73,10 +76,15 @@ static void close_model(opened *o)
     pliant_reader_close(o->reader);
 }
 
-// Nodal values of one column, [m + 1][9]; the caller frees.
-static double *column_of(const opened *o, pliant_block_name block, int32_t column)
+static int32_t finest(const opened *o)
 {
-    const pliant_greens_view *g = &o->view.greens[block][o->view.level_count - 1];
+    return o->view.level_count - 1;
+}
+
+// Nodal values of one column of a level, [m + 1][9]; the caller frees.
+static double *column_of(const opened *o, pliant_block_name block, int32_t level, int32_t column)
+{
+    const pliant_greens_view *g = &o->view.greens[block][level];
     const pliant_wavelet *w = o->wavelets[block == PLIANT_FIXED_FREE || block == PLIANT_FIXED_FIXED];
     double *x = calloc(((size_t)w->count + 1) * 9, sizeof *x);
     for (uint64_t q = g->column_offset[column]; q < g->column_offset[column + 1]; q++)
@@ -95,14 +103,18 @@ static int32_t rows_of(const opened *o, pliant_block_name block)
     return block == PLIANT_FREE_FREE || block == PLIANT_FREE_FIXED ? o->view.free_count : o->view.fixed_count;
 }
 
-// Largest difference of two models' columns, relative to each column's largest value.
-static double difference(const opened *a, const opened *b)
+// Largest difference of two models' columns on one level, relative to each column's largest value.
+static double difference_on(const opened *a, const opened *b, int32_t level)
 {
     double worst = 0;
     for (int block = 0; block < PLIANT_BLOCK_COUNT; block++) {
-        if (!a->view.greens[block][a->view.level_count - 1].row) continue;
-        for (int32_t j = 0; j < columns_of(a, (pliant_block_name)block); j++) {
-            double *x = column_of(a, (pliant_block_name)block, j), *y = column_of(b, (pliant_block_name)block, j);
+        const pliant_greens_view *g = &a->view.greens[block][level], *h = &b->view.greens[block][level];
+        assert_true(!g->column_offset == !h->column_offset);
+        if (!g->column_offset) continue;
+        assert_int_equal(g->column_count, h->column_count);
+        for (int32_t j = 0; j < g->column_count; j++) {
+            double *x = column_of(a, (pliant_block_name)block, level, j);
+            double *y = column_of(b, (pliant_block_name)block, level, j);
             double peak = 0, off = 0;
             for (int32_t i = 0; i < 9 * rows_of(a, (pliant_block_name)block); i++)
                 peak = fmax(peak, fabs(x[i])), off = fmax(off, fabs(x[i] - y[i]));
@@ -110,6 +122,14 @@ static double difference(const opened *a, const opened *b)
             free(x), free(y);
         }
     }
+    return worst;
+}
+
+// The same over all levels.
+static double difference(const opened *a, const opened *b)
+{
+    double worst = 0;
+    for (int32_t l = 0; l < a->view.level_count; l++) worst = fmax(worst, difference_on(a, b, l));
     return worst;
 }
 
@@ -146,9 +166,24 @@ static void help_version_and_misuse_have_their_exit_status(void **state)
         {"--fixed 'z<0' -o b.h5", "expected a MESH"},
         {"--fixed 'z<0' -o b.h5 a.obj c.obj", "found also 'c.obj'"},
         {"--fixed 'z<0' -o b.h5 --dense b.h5 a.obj", "same file"},
+        {"--constraint-levels", "--constraint-levels: expected a value"},
+        {"--constraint-levels 2..1 a.obj", "expected A..B, levels from 0 to 15 with A at most B, or A, found '2..1'"},
+        {"--constraint-levels x a.obj", "found 'x'"},
+        {"--constraint-levels 1.. a.obj", "found '1..'"},
+        {"--constraint-levels ..1 a.obj", "found '..1'"},
+        {"--constraint-levels 0..1..2 a.obj", "found '0..1..2'"},
+        {"--constraint-levels -1 a.obj", "found '-1'"},
+        {"--constraint-levels '0 ..1' a.obj", "found '0 ..1'"},
+        {"--constraint-levels 99999999999 a.obj", "found '99999999999'"},
+        {"--constraint-levels 16 a.obj", "found '16'"},
+        // Seen beside the mesh.
+        {"--constraint-levels 0..3 --subdivide 2 --fixed 'z<0.03' scripts/sample/whale.obj -o b.h5",
+         "--constraint-levels: expected levels of scripts/sample/whale.obj, 0 to 2, found 3"},
+        {"--constraint-levels 0..1 --dense c.h5 --subdivide 2 --fixed 'z<0.03' scripts/sample/whale.obj -o b.h5",
+         "--dense stores columns of the finest level, 2: expected --constraint-levels up to it, found up to 1"},
     };
     for (size_t i = 0; i < sizeof misuses / sizeof *misuses; i++) {
-        check_run(&c, "%s/pliant-precompute %s", check_build(), misuses[i].arguments);
+        check_run(&c, "%s/pliant-precompute -q %s", check_build(), misuses[i].arguments);
         assert_int_equal(c.status, 2);
         check_one_line(&c, name, misuses[i].part);
     }
@@ -156,6 +191,11 @@ static void help_version_and_misuse_have_their_exit_status(void **state)
     check_run(&c, "mpirun --quiet -n 3 %s/pliant-precompute --nonsense", check_build());
     assert_int_equal(c.status, 2);
     check_one_line(&c, name, "--nonsense");
+    check_run(&c, "mpirun --quiet -n 3 %s/pliant-precompute -q --constraint-levels 4 %s %s -o %s", check_build(), small_run,
+              sample, in_folder("misused.h5"));
+    assert_int_equal(c.status, 2);
+    check_one_line(&c, name, "found 4");
+    assert_int_not_equal(access(in_folder("misused.h5"), F_OK), 0);
 }
 
 static void refusals_name_what_and_why_and_leave_nothing(void **state)
@@ -278,9 +318,8 @@ static void a_killed_run_leaves_nothing_under_the_outputs_name(void **state)
     assert_int_equal(c.status, 0);
 }
 
-static void one_two_and_three_ranks_write_the_same_model(void **state)
+static void compare_ranks(const char *options)
 {
-    (void)state;
     check_command c;
     opened models[4];
     // The last: the distributed solver in place of the shared-memory one.
@@ -289,8 +328,8 @@ static void one_two_and_three_ranks_write_the_same_model(void **state)
     for (int i = 0; i < 4; i++) {
         char output[512];
         snprintf(output, sizeof output, "%s/ranks%d.h5", check_folder(), i);
-        check_run(&c, "%s %s/pliant-precompute -q --blocks all %s %s -o %s", launches[i], check_build(), small_run,
-                  sample, output);
+        check_run(&c, "%s %s/pliant-precompute -q --force --blocks all %s %s %s -o %s", launches[i], check_build(),
+                  options, small_run, sample, output);
         if (c.status != 0) print_error("%s\n%s", launches[i], c.errors);
         assert_int_equal(c.status, 0);
         models[i] = open_model(output);
@@ -302,8 +341,92 @@ static void one_two_and_three_ranks_write_the_same_model(void **state)
         // Solutions differ by round-off times the condition number (under 1e4 here); a coefficient on
         // the edge of its threshold would show as 1e-3 or more.
         check_at_most(difference(&models[0], &models[i]), 1e-6);
+        for (int32_t l = 0; l < models[0].view.level_count; l++) {
+            const double *s = models[0].view.greens[PLIANT_FREE_FREE][l].summary;
+            const double *t = models[i].view.greens[PLIANT_FREE_FREE][l].summary;
+            // Errors to the rounding of sums, the eigenvalue to its residual.
+            for (int k = 0; s && k < PLIANT_SUMMARY_COUNT; k++)
+                check_near(t[k], s[k], k == PLIANT_SUMMARY_DEFINITE ? 1e-3 : 1e-6);
+        }
     }
     for (int i = 0; i < 4; i++) close_model(&models[i]);
+}
+
+static void one_two_and_three_ranks_write_the_same_model(void **state)
+{
+    (void)state;
+    compare_ranks("");
+    compare_ranks("--constraint-levels 0..1 --eps 0.1");
+}
+
+// GF-60..62: what is refined offline from the finest columns, and what is solved for at once.
+static void direct_coarse_columns_are_the_refined_ones(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *all = in_folder("all-levels.h5"), *coarse = in_folder("coarse-levels.h5");
+    check_run(&c, "mpirun --quiet -n 2 %s/pliant-precompute --json --blocks all --eps 1e-9 %s %s -o %s", check_build(),
+              small_run, sample, all);
+    assert_int_equal(c.status, 0);
+    const char *memory = strstr(c.output, "\"memory_bytes\": ");
+    assert_non_null(memory);
+    const double all_bytes = strtod(memory + 16, NULL);
+    check_run(&c, "mpirun --quiet -n 2 %s/pliant-precompute --json --blocks all --eps 1e-9 --constraint-levels 0..1 %s %s -o %s",
+              check_build(), small_run, sample, coarse);
+    assert_int_equal(c.status, 0);
+    memory = strstr(c.output, "\"memory_bytes\": ");
+    assert_non_null(memory);
+    // The matrix and a batch stay; of as many right-hand sides a quarter is left.
+    check_at_most(strtod(memory + 16, NULL), 0.75 * all_bytes);
+    opened o = open_model(all), p = open_model(coarse);
+    assert_int_equal(o.view.level_count, 3);
+    for (int32_t l = 0; l < 2; l++) {
+        assert_non_null(p.view.greens[PLIANT_FREE_FREE][l].column_offset);
+        // Floats round both by 6e-8 of a column's scale, and the spool another 6e-8.
+        check_at_most(difference_on(&o, &p, l), 1e-6);
+    }
+    assert_null(p.view.greens[PLIANT_FREE_FREE][2].column_offset);
+    assert_non_null(o.view.greens[PLIANT_FREE_FREE][2].column_offset);
+    // pliant-info has a line of each, and finds the eigenvalues that are stored.
+    check_run(&c, "%s/pliant-info %s", check_build(), coarse);
+    assert_int_equal(c.status, 0);
+    assert_non_null(strstr(c.output, "constraint_levels = 0..1"));
+    for (int block = 0; block < PLIANT_BLOCK_COUNT; block++)
+        for (int32_t l = 0; l < 3; l++) {
+            char line[64];
+            snprintf(line, sizeof line, "%-11s  %5d  %8d  %7d  ", pliant_block_text((pliant_block_name)block), l,
+                     o.view.level_vertex_count[l], o.view.greens[block][l].column_count);
+            assert_true(!strstr(c.output, line) == (l == 2));
+        }
+    for (int i = 0; i < 2; i++) {
+        check_run(&c, "%s/pliant-info --verify %s", check_build(), i ? coarse : all);
+        assert_int_equal(c.status, 0);
+        const char *line = c.output;
+        for (int32_t l = 0; l < (i ? 2 : 3); l++) {
+            line = strstr(line, "contact compliance, level ");
+            assert_non_null(line);
+            line += strlen("contact compliance, level ");
+            assert_int_equal(strtol(line, NULL, 10), l);
+            const char *stored = strstr(line, ", as stored)\n"), *end = strchr(line, '\n');
+            assert_true(stored && stored < end);
+        }
+        assert_null(strstr(line, "contact compliance"));
+    }
+    close_model(&p);
+    close_model(&o);
+}
+
+// The exact column k of a level: the dense file's, refined by hats. [rows + 1][9]; the caller frees.
+static double *exact_column(const double *matrix, int32_t rows, int32_t columns, const pliant_hats *hats, int32_t level,
+                            int32_t k)
+{
+    double *x = calloc(((size_t)rows + 1) * 9, sizeof *x);
+    for (int32_t e = hats->offset[level][k]; e < hats->offset[level][k + 1]; e++)
+        for (int32_t i = 0; i < rows; i++)
+            for (int c = 0; c < 9; c++)
+                x[9 * i + c] += hats->weight[level][e] * matrix[(3 * (size_t)i + c / 3) * 3 * columns +
+                                                                3 * (size_t)hats->position[level][e] + c % 3];
+    return x;
 }
 
 static void stored_columns_meet_their_errors_against_the_dense_file(void **state)
@@ -321,30 +444,41 @@ static void stored_columns_meet_their_errors_against_the_dense_file(void **state
     check_ok(pliant_reader_open(dense, &reader, &err), &err);
     check_ok(pliant_dense_view_bind(reader, &d, &err), &err);
     const double *const matrices[] = {d.free_free, d.free_fixed, d.fixed_free, d.fixed_fixed};
+    pliant_hats *hats[2];
+    check_ok(pliant_hats_create(o.wavelets[0], o.view.free_nodes, o.areas, &hats[0], &err), &err);
+    check_ok(pliant_hats_create(o.wavelets[1], o.view.fixed_nodes, o.areas, &hats[1], &err), &err);
     for (int block = 0; block < PLIANT_BLOCK_COUNT; block++) {
         const int32_t rows = rows_of(&o, (pliant_block_name)block), columns = columns_of(&o, (pliant_block_name)block);
-        const double *summary = o.view.greens[block][o.view.level_count - 1].summary;
-        double error = 0, energy = 0, max = 0;
-        for (int32_t j = 0; j < columns; j++) {
-            double *x = column_of(&o, (pliant_block_name)block, j), largest = 0, peak = 0;
-            for (int32_t i = 0; i < rows; i++) {
-                double off = 0, square = 0;
-                for (int e = 0; e < 9; e++) {
-                    const double value = matrices[block][(3 * (size_t)i + e / 3) * 3 * columns + 3 * j + e % 3];
-                    off += (x[9 * i + e] - value) * (x[9 * i + e] - value), square += value * value;
+        const pliant_hats *h = hats[block == PLIANT_FREE_FIXED || block == PLIANT_FIXED_FIXED];
+        for (int32_t l = 0; l <= finest(&o); l++) {
+            const pliant_greens_view *g = &o.view.greens[block][l];
+            double error = 0, energy = 0, max = 0;
+            assert_non_null(g->summary);
+            assert_int_equal(g->column_count, h->level_offset[l + 1]);
+            for (int32_t j = 0; j < g->column_count; j++) {
+                double *x = column_of(&o, (pliant_block_name)block, l, j), largest = 0, peak = 0;
+                double *value = exact_column(matrices[block], rows, columns, h, l, j);
+                for (int32_t i = 0; i < rows; i++) {
+                    double off = 0, square = 0;
+                    for (int e = 9 * i; e < 9 * (i + 1); e++)
+                        off += (x[e] - value[e]) * (x[e] - value[e]), square += value[e] * value[e];
+                    error += off, energy += square;
+                    largest = fmax(largest, off), peak = fmax(peak, square);
                 }
-                error += off, energy += square;
-                largest = fmax(largest, off), peak = fmax(peak, square);
+                max = fmax(max, sqrt(largest / peak));
+                free(value), free(x);
             }
-            max = fmax(max, sqrt(largest / peak));
-            free(x);
+            if (g->column_count == 0) continue;
+            // What the file says of itself, recomputed the slow way.
+            check_near(sqrt(error / energy), g->summary[PLIANT_SUMMARY_RMS], 2e-6);
+            check_near(max, g->summary[PLIANT_SUMMARY_MAX], 2e-6);
+            check_near((double)rows * g->column_count / (double)g->nnz, g->summary[PLIANT_SUMMARY_FACTOR], 1e-9);
+            check_at_most(sqrt(error / energy), 0.01);
+            check_at_most(max, 0.03);
         }
-        // What the file says of itself, recomputed the slow way.
-        check_near(sqrt(error / energy), summary[PLIANT_SUMMARY_RMS], 2e-6);
-        check_near(max, summary[PLIANT_SUMMARY_MAX], 2e-6);
-        check_at_most(sqrt(error / energy), 0.01);
-        check_at_most(max, 0.03);
     }
+    pliant_hats_destroy(hats[1]);
+    pliant_hats_destroy(hats[0]);
     pliant_reader_close(reader);
     close_model(&o);
 }
@@ -421,8 +555,16 @@ static void json_summary_is_one_object(void **state)
     assert_int_equal(c.status, 0);
     assert_int_equal(c.output[0], '{');
     assert_non_null(strstr(c.output, "\"free-free\": {\"kept\": "));
-    check_run(&c, "%s/pliant-precompute --json %s %s -o %s > /dev/full", check_build(), small_run, sample, in_folder("json2.h5"));
+    assert_non_null(strstr(c.output, "\"levels\": [{\"level\": 0, \"columns\": "));
+    assert_non_null(strstr(c.output, "{\"level\": 2, \"columns\": "));
+    assert_non_null(strstr(c.output, "\"smallest_eigenvalue\": "));
+    // The summary cannot be printed; the file, here of one level and without spools, is there.
+    check_run(&c, "%s/pliant-precompute --json --constraint-levels 1 --eps 0.1 %s %s -o %s > /dev/full", check_build(),
+              small_run, sample, in_folder("json2.h5"));
     assert_int_equal(c.status, 1);
+    opened o = open_model(in_folder("json2.h5"));
+    for (int32_t l = 0; l < 3; l++) assert_true(!o.view.greens[PLIANT_FREE_FREE][l].column_offset == (l != 1));
+    close_model(&o);
 }
 
 int main(void)
@@ -436,6 +578,7 @@ int main(void)
         cmocka_unit_test(a_full_disk_leaves_no_file_and_says_so),
         cmocka_unit_test(a_killed_run_leaves_nothing_under_the_outputs_name),
         cmocka_unit_test(one_two_and_three_ranks_write_the_same_model),
+        cmocka_unit_test(direct_coarse_columns_are_the_refined_ones),
         cmocka_unit_test(stored_columns_meet_their_errors_against_the_dense_file),
         cmocka_unit_test(a_model_without_loss_plays_as_its_dense_file),
         cmocka_unit_test(source_numbers_follow_a_shuffled_mesh),
