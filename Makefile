@@ -43,6 +43,7 @@ HDF5_CFLAGS  := $(if $(HAVE_HDF5),$(shell $(PKG) --cflags hdf5-serial),-DPLIANT_
 HDF5_LIBS    := $(if $(HAVE_HDF5),$(shell $(PKG) --libs hdf5-serial))
 PETSC_CFLAGS := $(if $(HAVE_PETSC),$(patsubst -I%,-isystem %,$(shell $(PKG) --cflags petsc ompi-c)))
 PETSC_LIBS   := $(if $(HAVE_PETSC),$(shell $(PKG) --libs petsc ompi-c hdf5-openmpi))
+MPI_LIBS     := $(if $(HAVE_PETSC),$(shell $(PKG) --libs ompi-c))
 PHDF5_CFLAGS := $(if $(HAVE_PETSC),$(patsubst -I%,-isystem %,$(shell $(PKG) --cflags hdf5-openmpi)))
 ASSIMP_CFLAGS := $(if $(HAVE_PETSC),$(patsubst -I%,-isystem %,$(shell $(PKG) --cflags assimp)))
 ASSIMP_LIBS  := $(if $(HAVE_PETSC),$(shell $(PKG) --libs assimp))
@@ -157,6 +158,8 @@ $(OBJ)/runtime/%.o: runtime/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_runtime) $(if $(HAVE_HDF5),,-DPLIANT_WITHOUT_HDF5))
 $(OBJ)/tests/precompute/%.o: tests/precompute/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_tests) $(PETSC_CFLAGS))
+$(OBJ)/tests/bench/bench_levels.o: tests/bench/bench_levels.c $(FLAGS_STAMP)
+	$(call compile,$(I_tests) $(PETSC_CFLAGS))
 $(OBJ)/tests/%.o: tests/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_tests) $(HDF5_CFLAGS))
 
@@ -216,7 +219,7 @@ endif
 TESTS     := $(patsubst tests/%.c,$(OUT)/tests/%,$(filter $(wildcard tests/*/test_$(T).c),$(TEST_SRC)))
 BENCH_SRC := $(sort $(wildcard tests/bench/bench_*.c))
 ifneq ($(HAVE_PETSC),yes)
-BENCH_SRC := $(filter-out tests/bench/bench_bem.c tests/bench/bench_precompute.c,$(BENCH_SRC))
+BENCH_SRC := $(filter-out tests/bench/bench_bem.c tests/bench/bench_levels.c tests/bench/bench_precompute.c,$(BENCH_SRC))
 endif
 BENCHES   := $(patsubst tests/%.c,$(OUT)/tests/%,$(BENCH_SRC))
 
@@ -224,7 +227,7 @@ TEST_LIBS := $(LIB_support) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_play) $(LIB_info
 $(OUT)/tests/precompute/%: $(OBJ)/tests/precompute/%.o $(LIB_support) $(LIB_precompute) $(LIB_pliant) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(CMOCKA_LIBS) $(ASSIMP_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/bench/%: $(OBJ)/tests/bench/%.o $(LIB_support) $(if $(HAVE_PETSC),$(LIB_precompute)) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
-	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(ASSIMP_LIBS) $(LAPACK_LIBS) -lm -lpthread
+	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(ASSIMP_LIBS) $(MPI_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/%: $(OBJ)/tests/%.o $(TEST_LIBS)
 	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
 
