@@ -66,6 +66,10 @@ static pliant_status check_levels(const pliant_problem *p, const pliant_options 
     if (p->levels.last > finest)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--constraint-levels: expected levels of %s, 0 to %d, found %d",
                                 options->mesh, finest, p->levels.last);
+    if (p->free_hats->level_offset[p->levels.last + 1] == 0)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--constraint-levels: expected a level with free vertices of %s, found none of them "
+                                "on level %d", options->mesh, p->levels.last);
     if (options->dense && p->levels.last < finest)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "--dense stores columns of the finest level, %d: expected --constraint-levels "

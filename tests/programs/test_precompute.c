@@ -416,6 +416,35 @@ static void direct_coarse_columns_are_the_refined_ones(void **state)
     close_model(&o);
 }
 
+static void a_level_without_free_vertices_is_empty_or_refused(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *model = in_folder("whole.h5"), *mesh = in_folder("whole.obj"), *list = in_folder("base.txt");
+    check_run(&c, "%s/pliant-precompute -q --eps 0.2 %s %s -o %s && %s/pliant-info --export %s %s && seq 0 11 > %s",
+              check_build(), small_run, sample, model, check_build(), mesh, model, list);
+    assert_int_equal(c.status, 0);
+    // All base vertices are held.
+    static const char *const rules[] = {"", "--eps 0.1"};
+    for (int i = 0; i < 2; i++) {
+        check_run(&c, "mpirun --quiet -n 2 %s/pliant-precompute -q --force --blocks all %s --fixed-list %s %s -o %s",
+                  check_build(), rules[i], list, mesh, model);
+        if (c.status) print_error("%s", c.errors);
+        assert_int_equal(c.status, 0);
+        opened o = open_model(model);
+        assert_int_equal(o.view.greens[PLIANT_FREE_FREE][0].column_count, 0);
+        assert_int_equal(o.view.greens[PLIANT_FREE_FIXED][0].column_count, 12);
+        assert_int_equal(o.view.greens[PLIANT_FREE_FREE][1].column_count, 30);
+        close_model(&o);
+        check_run(&c, "%s/pliant-info --verify %s", check_build(), model);
+        assert_int_equal(c.status, 0);
+    }
+    check_run(&c, "%s/pliant-precompute -q --force --constraint-levels 0 --fixed-list %s %s -o %s", check_build(), list,
+              mesh, model);
+    assert_int_equal(c.status, 2);
+    check_one_line(&c, name, "found none of them on level 0");
+}
+
 // The exact column k of a level: the dense file's, refined by hats. [rows + 1][9]; the caller frees.
 static double *exact_column(const double *matrix, int32_t rows, int32_t columns, const pliant_hats *hats, int32_t level,
                             int32_t k)
@@ -579,6 +608,7 @@ int main(void)
         cmocka_unit_test(a_killed_run_leaves_nothing_under_the_outputs_name),
         cmocka_unit_test(one_two_and_three_ranks_write_the_same_model),
         cmocka_unit_test(direct_coarse_columns_are_the_refined_ones),
+        cmocka_unit_test(a_level_without_free_vertices_is_empty_or_refused),
         cmocka_unit_test(stored_columns_meet_their_errors_against_the_dense_file),
         cmocka_unit_test(a_model_without_loss_plays_as_its_dense_file),
         cmocka_unit_test(source_numbers_follow_a_shuffled_mesh),
