@@ -9,6 +9,8 @@
 
 #include "pliant/error.h"
 #include "pliant/halfedge.h"
+#include "pliant/loop.h"
+#include "pliant/refine.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,53 +29,6 @@ typedef struct step {
     double *sum;       // [vertex_count][3]: scratch of the even rule
     int32_t *count;    // valence of each vertex, or rings that reached each odd vertex
 } step;
-
-// ---- Topology ----
-
-static void number_odd(step *s)
-{
-    const int32_t side_count = 3 * s->face_count;
-    int32_t next = 0;
-    for (int32_t h = 0; h < side_count; h++) {
-        if (s->twin[h] < h) {
-            s->odd[h] = s->odd[s->twin[h]];
-            continue;
-        }
-        const int32_t a = s->faces[h], b = s->faces[pliant_halfedge_next(h)];
-        s->parents[2 * (size_t)next] = a < b ? a : b;
-        s->parents[2 * (size_t)next + 1] = a < b ? b : a;
-        s->odd[h] = s->vertex_count + next++;
-    }
-}
-
-// Replace the faces by their children (hierarchy.h), from the last, whose room nothing else needs.
-static void split_faces(step *s)
-{
-    for (int32_t f = s->face_count - 1; f >= 0; f--) {
-        const int32_t *c = s->faces + 3 * (size_t)f, *m = s->odd + 3 * (size_t)f;
-        const int32_t children[12] = {c[0], m[0], m[2], c[1], m[1], m[0],
-                                      c[2], m[2], m[1], m[0], m[1], m[2]};
-        memcpy(s->faces + 12 * (size_t)f, children, sizeof children);
-    }
-}
-
-// Replace the twins by those of the children. Half-edge k of face f is cut into side 0 of child k
-// and side 2 of child k+1; side 1 of child k faces side k-1 of the middle child.
-static void split_twins(step *s)
-{
-    for (int32_t f = s->face_count - 1; f >= 0; f--) {
-        const int32_t across[3] = {s->twin[3 * f], s->twin[3 * f + 1], s->twin[3 * f + 2]};
-        int32_t *child = s->twin + 12 * (size_t)f;
-        for (int32_t k = 0; k < 3; k++) {
-            const int32_t g = across[k] / 3, j = across[k] % 3, next = (k + 1) % 3,
-                          last = (k + 2) % 3;
-            child[3 * k] = 3 * (4 * g + (j + 1) % 3) + 2;
-            child[3 * next + 2] = 3 * (4 * g + j);
-            child[3 * k + 1] = 3 * (4 * f + 3) + last;
-            child[9 + last] = 3 * (4 * f + k) + 1;
-        }
-    }
-}
 
 // ---- Positions ----
 
@@ -122,18 +77,15 @@ static void visit_neighbours(step *s, double *sum)
     }
 }
 
-// Odd vertices: 3/8 of the ends, 1/8 of the opposite corners. Even ones, of valence n:
-//   x' = (1 - n beta) x + beta sum of neighbours,  beta = (5/8 - (3/8 + cos(2 pi / n) / 4)^2) / n
 static void place_loop(step *s)
 {
     for (int32_t h = 0; h < 3 * s->face_count; h++)
-        if (h < s->twin[h]) place_odd(s, h, 3.0 / 8, 1.0 / 8);
+        if (h < s->twin[h]) place_odd(s, h, PLIANT_LOOP_END, PLIANT_LOOP_CORNER);
     visit_neighbours(s, s->sum);
     for (int32_t v = 0; v < s->vertex_count; v++) {
-        const int32_t n = s->count[v];
-        const double q = 3.0 / 8 + cos(TURN / n) / 4, beta = (5.0 / 8 - q * q) / n;
+        const double beta = pliant_loop_beta(s->count[v]), centre = 1 - s->count[v] * beta;
         double *x = s->vertices + 3 * (size_t)v;
-        for (int c = 0; c < 3; c++) x[c] = (1 - n * beta) * x[c] + beta * s->sum[3 * (size_t)v + c];
+        for (int c = 0; c < 3; c++) x[c] = centre * x[c] + beta * s->sum[3 * (size_t)v + c];
     }
 }
 
@@ -220,7 +172,7 @@ static void place_butterfly(step *s)
 
 static void refine(step *s, pliant_subdivision_scheme scheme)
 {
-    number_odd(s);
+    pliant_refine_number(s->vertex_count, s->face_count, s->faces, s->twin, s->odd, s->parents);
     switch (scheme) {
     case PLIANT_SUBDIVIDE_LOOP:
         place_loop(s);
@@ -232,7 +184,7 @@ static void refine(step *s, pliant_subdivision_scheme scheme)
         place_midpoints(s);
         break;
     }
-    split_faces(s);
+    pliant_refine_faces(s->face_count, s->odd, s->faces);
     s->parents += s->face_count / 2 * 3 * (size_t)2;
     s->vertex_count += s->face_count / 2 * 3;
 }
@@ -297,7 +249,7 @@ pliant_status pliant_multires_subdivide(const pliant_mesh *base, int32_t levels,
                   .count = count};
         for (int32_t l = 0; l < levels; l++, s.face_count *= 4) {
             refine(&s, scheme);
-            if (l + 1 < levels) split_twins(&s);
+            if (l + 1 < levels) pliant_refine_twins(s.face_count, s.twin);
         }
     }
     *multires = m;
