@@ -279,8 +279,8 @@ void pliant_loop_limit_destroy(pliant_loop_limit *limit)
     free(limit);
 }
 
-void pliant_loop_limit_evaluate(const pliant_loop_limit *limit, int32_t row,
-                                const double *vertices, double point[9])
+void pliant_loop_limit_evaluate(const pliant_loop_limit *limit, int32_t row, const double *vertices,
+                                double point[9])
 {
     memset(point, 0, 9 * sizeof *point);
     for (size_t i = limit->offset[row]; i < limit->offset[row + 1]; i++) {

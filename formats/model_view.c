@@ -15,6 +15,7 @@ typedef struct binding {
     const pliant_reader *reader;
     const char *name;
     pliant_model_view *view;
+    int is_there[3];  // by pliant_presence
     uint64_t extent[PLIANT_EXTENT_COUNT];
 #define DECLARE(field, ...) const pliant_section *field;
     struct {
@@ -32,7 +33,7 @@ static pliant_status find_sections(binding *b, pliant_error *err)
 {
     pliant_status status;
 #define FIND(field, path, type, rank, extent0, extent1, extent2, presence, unit)                   \
-    if (PLIANT_##presence == PLIANT_ALWAYS || b->view->has_supports) {                             \
+    if (b->is_there[PLIANT_##presence]) {                                                          \
         status = pliant_bind_find(b->reader, path, PLIANT_##type, rank, &b->section.field, err);   \
         if (status < 0) return status;                                                             \
         b->view->field = b->section.field->data;                                                   \
@@ -90,11 +91,49 @@ static pliant_status check_level_counts(binding *b, pliant_error *err)
     return PLIANT_OK;
 }
 
+// Detail: level_count[0] = n, and every level has a vertex more for each edge of the one before.
+static pliant_status check_detail_counts(binding *b, pliant_error *err)
+{
+    pliant_model_view *v = b->view;
+    if (!b->is_there[PLIANT_WITH_DETAIL]) return PLIANT_OK;
+    int32_t levels = 0;
+    pliant_status status = pliant_bind_count(b->reader, b->section.detail_level_count, 2,
+                                             PLIANT_LEVEL_LIMIT + 2 - v->level_count, &levels, err);
+    if (status == PLIANT_OK)
+        status = pliant_bind_count(b->reader, b->section.detail_offset, 1, PLIANT_VERTEX_LIMIT,
+                                   &v->detail_vertex_count, err);
+    if (status < 0) return status;
+    v->detail_steps = levels - 1;
+    b->extent[PLIANT_EXTENT_STEPS_1] = (uint64_t)levels;
+    b->extent[PLIANT_EXTENT_DETAIL] = (uint64_t)v->detail_vertex_count;
+    int64_t expected = v->vertex_count, faces = v->face_count;
+    for (int32_t i = 0; i < levels; i++) {
+        const int32_t found = v->detail_level_count[i];
+        if (faces > PLIANT_FACE_LIMIT)
+            return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                    "%s: /detail/level_count: element %d: expected at most %d "
+                                    "faces, found %" PRId64,
+                                    b->name, (int)i, PLIANT_FACE_LIMIT, faces);
+        if (found != expected)
+            return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                    "%s: /detail/level_count: element %d: expected %" PRId64
+                                    " vertices, found %d",
+                                    b->name, (int)i, expected, (int)found);
+        expected += faces / 2 * 3;
+        faces *= 4;
+    }
+    const int32_t last = v->detail_level_count[v->detail_steps];
+    if (last == v->detail_vertex_count) return PLIANT_OK;
+    return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                            "%s: /detail/offset: expected length %d along axis 0, found %d",
+                            b->name, (int)last, (int)v->detail_vertex_count);
+}
+
 static pliant_status check_shapes(const binding *b, pliant_error *err)
 {
     pliant_status status;
 #define CHECK(field, path, type, rank, extent0, extent1, extent2, presence, unit)                  \
-    if (PLIANT_##presence == PLIANT_ALWAYS || b->view->has_supports) {                             \
+    if (b->is_there[PLIANT_##presence]) {                                                          \
         const uint64_t shape[3] = {b->extent[PLIANT_EXTENT_##extent0],                             \
                                    b->extent[PLIANT_EXTENT_##extent1],                             \
                                    b->extent[PLIANT_EXTENT_##extent2]};                            \
@@ -200,7 +239,8 @@ static pliant_status check_contents(const binding *b, pliant_error *err)
     const pliant_model_view *v = b->view;
     const int64_t n = v->vertex_count;
     const pliant_section *finite[] = {b->section.vertices, b->section.material,
-                                      b->section.gravity_free, b->section.gravity_fixed};
+                                      b->section.gravity_free, b->section.gravity_fixed,
+                                      b->section.detail_offset};
     pliant_status status = PLIANT_OK;
     for (size_t i = 0; i < sizeof finite / sizeof *finite && status == PLIANT_OK; i++)
         if (finite[i]) status = pliant_bind_finite(b->reader, finite[i], err);
@@ -223,6 +263,9 @@ static pliant_status check_contents(const binding *b, pliant_error *err)
     if (status == PLIANT_OK)
         status = check_level_offsets(b, b->section.fixed_level_offset, v->fixed_nodes,
                                      v->fixed_count, err);
+    if (status == PLIANT_OK && b->section.detail_source_index)
+        status = pliant_bind_indices(b->reader, b->section.detail_source_index, -1,
+                                     (int64_t)INT32_MAX + 1, PLIANT_ANY_ORDER, err);
     if (status == PLIANT_OK) status = check_text(b, err);
     return status;
 }
@@ -242,14 +285,16 @@ static int is_stored(const pliant_reader *reader, pliant_block_name block, int32
     return found;
 }
 
-static int is_supports_section(const char *path)
+// Is this a section of the table that is there under that condition?
+static int has_presence(const char *path, pliant_presence wanted)
 {
     int found = 0;
 #define LOOK(field, section_path, type, rank, a, b, c, presence, unit)                             \
-    found |= PLIANT_##presence == PLIANT_WITH_SUPPORTS && strcmp(path, section_path) == 0;
+    found |= PLIANT_##presence == wanted && strcmp(path, section_path) == 0;
     PLIANT_MODEL_SECTIONS(LOOK)
 #undef LOOK
-    for (pliant_block_name block = PLIANT_FREE_FIXED; block < PLIANT_BLOCK_COUNT; block++) {
+    for (pliant_block_name block = PLIANT_FREE_FIXED;
+         wanted == PLIANT_WITH_SUPPORTS && block < PLIANT_BLOCK_COUNT; block++) {
         char group[PLIANT_PATH_LIMIT];
         const int length = snprintf(group, sizeof group, "/greens/%s/", pliant_block_text(block));
         found |= strncmp(path, group, (size_t)length) == 0;
@@ -257,10 +302,11 @@ static int is_supports_section(const char *path)
     return found;
 }
 
-static int has_supports(const pliant_reader *reader)
+// One such section asks for all of them.
+static int has_any(const pliant_reader *reader, pliant_presence wanted)
 {
     for (int32_t i = 0; i < pliant_reader_section_count(reader); i++)
-        if (is_supports_section(pliant_reader_section(reader, i)->path)) return 1;
+        if (has_presence(pliant_reader_section(reader, i)->path, wanted)) return 1;
     return 0;
 }
 
@@ -381,11 +427,17 @@ pliant_status pliant_model_view_bind(const pliant_reader *reader, pliant_model_v
             pliant_reader_find(reader, "/dense/nodes") ? "a dense file" : "none");
     pliant_model_view v;
     memset(&v, 0, sizeof v);
-    v.has_supports = has_supports(reader);
-    binding b = {.reader = reader, .name = name, .view = &v};
+    v.has_supports = has_any(reader, PLIANT_WITH_SUPPORTS);
+    binding b = {.reader = reader,
+                 .name = name,
+                 .view = &v,
+                 .is_there = {[PLIANT_ALWAYS] = 1,
+                              [PLIANT_WITH_SUPPORTS] = v.has_supports,
+                              [PLIANT_WITH_DETAIL] = has_any(reader, PLIANT_WITH_DETAIL)}};
     pliant_status status = find_sections(&b, err);
     if (status == PLIANT_OK) status = count_all(&b, err);
     if (status == PLIANT_OK) status = check_level_counts(&b, err);
+    if (status == PLIANT_OK) status = check_detail_counts(&b, err);
     if (status == PLIANT_OK) status = check_shapes(&b, err);
     if (status == PLIANT_OK) status = check_contents(&b, err);
     if (status == PLIANT_OK) status = bind_greens(&b, err);

@@ -137,6 +137,16 @@ pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
                                 "vertices, %d free, %d fixed",
                                 (int)n, (int)layout->face_count, (int)layout->base_count, (int)m,
                                 (int)k);
+    if (layout->detail_steps != 0 &&
+        (layout->detail_steps < 0 ||
+         layout->detail_steps > PLIANT_LEVEL_LIMIT + 1 - layout->level_count ||
+         layout->detail_vertex_count <= n || layout->detail_vertex_count > PLIANT_VERTEX_LIMIT))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "model layout: detail: expected 1 to %d steps and %d to %d "
+                                "vertices, found %d and %d",
+                                PLIANT_LEVEL_LIMIT + 1 - (int)layout->level_count, (int)n + 1,
+                                PLIANT_VERTEX_LIMIT, (int)layout->detail_steps,
+                                (int)layout->detail_vertex_count);
     if (layout->level_mask == 0 || layout->level_mask >> layout->level_count != 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "model layout: expected stored levels among 0..%d, found mask %#x",
@@ -152,9 +162,14 @@ pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
     l.extent[PLIANT_EXTENT_FREE] = (uint64_t)m;
     l.extent[PLIANT_EXTENT_FIXED] = (uint64_t)k;
     l.extent[PLIANT_EXTENT_TEXT] = layout->text_bytes;
+    l.extent[PLIANT_EXTENT_DETAIL] = (uint64_t)layout->detail_vertex_count;
+    l.extent[PLIANT_EXTENT_STEPS_1] = (uint64_t)layout->detail_steps + 1;
 
+    const int is_there[] = {[PLIANT_ALWAYS] = 1,
+                            [PLIANT_WITH_SUPPORTS] = layout->has_supports,
+                            [PLIANT_WITH_DETAIL] = layout->detail_steps > 0};
 #define APPEND(field, path, type, rank, a, b, c, presence, unit)                                   \
-    if (PLIANT_##presence == PLIANT_ALWAYS || layout->has_supports)                                \
+    if (is_there[PLIANT_##presence])                                                               \
         append(&l, path, PLIANT_##type, rank, PLIANT_EXTENT_##a, PLIANT_EXTENT_##b,                \
                PLIANT_EXTENT_##c);
     PLIANT_MODEL_SECTIONS(APPEND)

@@ -329,9 +329,9 @@ static void huge_valences_are_refused_before_they_fill_the_memory(void **state)
     }
     levels l = make_levels(cone, 1);
     pliant_loop_limit *limit = NULL;
-    const pliant_status status = pliant_loop_limit_create(
-        1, l.hierarchy->vertex_count[0], l.hierarchy->face_count[0], l.hierarchy->faces, &limit,
-        &err);
+    const pliant_status status =
+        pliant_loop_limit_create(1, l.hierarchy->vertex_count[0], l.hierarchy->face_count[0],
+                                 l.hierarchy->faces, &limit, &err);
     assert_int_equal(status, PLIANT_ERR_MEMORY);
     assert_null(limit);
     if (!strstr(err.text, "valences are too large")) fail_msg("found \"%s\"", err.text);

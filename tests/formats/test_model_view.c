@@ -51,10 +51,11 @@ static void bound_view_shows_what_was_written(void **state)
 {
     (void)state;
     pliant_error err;
-    for (int supports = 0; supports < 2; supports++) {
+    for (int parts = 0; parts < 4; parts++) {
+        const int supports = parts & TINY_SUPPORTS;
         tiny_file file;
         size_t size;
-        tiny_model_make(3, supports, &file);
+        tiny_model_make(3, parts, &file);
         unsigned char *bytes = image_make(&file, &size);
         pliant_reader *reader;
         pliant_model_view v;
@@ -70,6 +71,14 @@ static void bound_view_shows_what_was_written(void **state)
         assert_int_equal(v.fixed_level_offset[3], v.fixed_count);
         check_near(v.material[1], 0.3, 0);
         assert_int_equal(v.gravity_fixed != NULL, supports);
+        assert_int_equal(v.detail_steps, parts & TINY_DETAIL ? 1 : 0);
+        assert_int_equal(v.detail_vertex_count, parts & TINY_DETAIL ? 258 : 0);
+        assert_int_equal(v.detail_offset != NULL, (parts & TINY_DETAIL) != 0);
+        if (v.detail_offset) {
+            assert_int_equal(v.detail_level_count[0], 66);
+            check_near(v.detail_offset[3 * 257 + 2], (float)sin(3 + 3 * 257 + 2), 0);
+            assert_int_equal(v.detail_source_index[0], 5);
+        }
         for (int block = 0; block < PLIANT_BLOCK_COUNT; block++) {
             const pliant_greens_view *g = &v.greens[block][2];
             assert_null(v.greens[block][0].column_offset);
@@ -159,11 +168,16 @@ static void wrong_numbers_are_refused_by_section_and_element(void **state)
         {"/greens/free-free/level2/summary", 2, 0.5, "summary: element 2: expected 0 or 1, found 0.5"},
         {"/greens/free-free/level2/summary", 3, -1, "summary: element 3: expected 0 or 1, found -1"},
         {"/greens/free-free/level2/summary", 4, NAN, "summary: element 4: expected a finite number"},
+        {"/detail/level_count", 0, 65, "/detail/level_count: element 0: expected 66 vertices, found 65"},
+        {"/detail/level_count", 1, 257, "/detail/level_count: element 1: expected 258 vertices, found 257"},
+        {"/detail/level_count", 1, -1, "/detail/level_count: element 1: expected 258 vertices, found -1"},
+        {"/detail/offset", 100, NAN, "/detail/offset: element 100: expected a finite number, found nan"},
+        {"/detail/source_index", -1, -2, "/detail/source_index: element 257: expected -1 to 2147483647, found -2"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         pliant_error err;
         tiny_file file;
-        tiny_model_make(3, 1, &file);
+        tiny_model_make(3, TINY_SUPPORTS | TINY_DETAIL, &file);
         set_element(tiny_find(&file, cases[i].path), cases[i].element, cases[i].value);
         const pliant_status status = bind_model(&file, &err);
         if (status != PLIANT_ERR_FORMAT) fail_msg("%s[%d] = %g: status %d", cases[i].path, (int)cases[i].element, cases[i].value, status);
@@ -178,12 +192,12 @@ static void wrong_shapes_and_absent_sections_are_refused_by_name(void **state)
     (void)state;
     pliant_error err;
     tiny_file file;
-    tiny_model_make(2, 1, &file);
+    tiny_model_make(2, TINY_SUPPORTS | TINY_DETAIL, &file);
     const int32_t count = file.section_count;
     tiny_free(&file);
     for (int32_t i = 0; i < count; i++) {
         for (int change = 0; change < 5; change++) {
-            tiny_model_make(2, 1, &file);
+            tiny_model_make(2, TINY_SUPPORTS | TINY_DETAIL, &file);
             tiny_section *s = &file.sections[i];
             char path[PLIANT_PATH_LIMIT + 10];
             snprintf(path, sizeof path, "%s", s->def.path);
@@ -198,9 +212,9 @@ static void wrong_shapes_and_absent_sections_are_refused_by_name(void **state)
             } else if (change == 2 && s->bytes > size) {
                 s->bytes -= s->bytes / s->def.shape[0];
                 s->def.shape[0]--;
-                // Any length of text will do; the number of faces is the hierarchy's to check.
-                if (strcmp(path, "/provenance/text") == 0 || strcmp(path, "/mesh/faces") == 0)
-                    expected = PLIANT_OK;
+                // Any length of text will do. The number of faces is the hierarchy's to check, but
+                // levels of detail are counted from it.
+                if (strcmp(path, "/provenance/text") == 0) expected = PLIANT_OK;
             } else if (change == 3 && s->def.rank > 1) {
                 s->bytes -= s->bytes / s->def.shape[1];
                 s->def.shape[1]--;
@@ -265,6 +279,30 @@ static void several_levels_and_unknown_sections_are_accepted(void **state)
     set_element(tiny_find(&file, "/greens/free-free/level0/column_offset"), 1, 1);
     assert_int_equal(bind_model(&file, &err), PLIANT_ERR_FORMAT);
     check_contains(err.text, "level0/column_offset: element 1: expected at most 0, found 1");
+    tiny_free(&file);
+}
+
+// Levels of detail that no int32_t numbers, and detail of the wrong depth.
+static void impossible_detail_is_refused(void **state)
+{
+    (void)state;
+    pliant_error err;
+    tiny_file file;
+    tiny_model_make(3, TINY_DETAIL, &file);
+    tiny_section *levels = tiny_find(&file, "/detail/level_count");
+    free(levels->data);
+    levels->def.shape[0] = 14;
+    int32_t *count = tiny_array(levels);
+    // 128 faces of level 2, four times as many each.
+    int64_t vertices = 66, faces = 128;
+    for (int i = 0; i < 14; i++, vertices += faces / 2 * 3, faces *= 4) count[i] = (int32_t)vertices;
+    assert_int_equal(bind_model(&file, &err), PLIANT_ERR_FORMAT);
+    check_contains(err.text, "/detail/level_count: element 12: expected at most 536870912 faces, found 2147483648");
+    levels->def.shape[0] = 15;
+    free(levels->data);
+    tiny_array(levels);
+    assert_int_equal(bind_model(&file, &err), PLIANT_ERR_FORMAT);
+    check_contains(err.text, "/detail/level_count: expected length 2 to 14, found 15");
     tiny_free(&file);
 }
 
@@ -358,6 +396,7 @@ int main(void)
         cmocka_unit_test(wrong_shapes_and_absent_sections_are_refused_by_name),
         cmocka_unit_test(fixed_blocks_come_all_or_none),
         cmocka_unit_test(several_levels_and_unknown_sections_are_accepted),
+        cmocka_unit_test(impossible_detail_is_refused),
         cmocka_unit_test(dense_and_model_files_are_told_apart),
         cmocka_unit_test(dense_files_are_checked_alike),
         cmocka_unit_test(file_of_version_1_still_opens),

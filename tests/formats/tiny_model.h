@@ -145,9 +145,16 @@ static inline int32_t tiny_domain(const tiny_mesh *mesh, int fixed, int32_t *nod
     return count;
 }
 
-// The sections of a model. supports: 1 as --blocks all. Free it with tiny_free.
-static inline void tiny_model_make(int32_t level_count, int supports, tiny_file *file)
+// What a tiny model holds besides the free-free block.
+enum {
+    TINY_SUPPORTS = 1,  // as --blocks all
+    TINY_DETAIL = 2,    // a displaced subdivision surface, one step finer
+};
+
+// The sections of a model. Free it with tiny_free.
+static inline void tiny_model_make(int32_t level_count, int parts, tiny_file *file)
 {
+    const int supports = parts & TINY_SUPPORTS, detail = (parts & TINY_DETAIL) != 0;
     const tiny_mesh mesh = tiny_mesh_make(level_count);
     int32_t nodes[2][TINY_VERTICES], offset[2][TINY_LEVELS + 1], count[2];
     for (int fixed = 0; fixed < 2; fixed++) count[fixed] = tiny_domain(&mesh, fixed, nodes[fixed], offset[fixed]);
@@ -163,6 +170,11 @@ static inline void tiny_model_make(int32_t level_count, int supports, tiny_file 
         .has_supports = supports,
         .level_mask = 1u << finest,
     };
+    const int32_t detail_levels[2] = {mesh.vertex_count, mesh.vertex_count + mesh.face_count / 2 * 3};
+    if (detail) {
+        layout.detail_steps = 1;
+        layout.detail_vertex_count = detail_levels[1];
+    }
     layout.free_columns[finest] = count[0];
     layout.fixed_columns[finest] = count[1];
     for (int block = 0; block < PLIANT_BLOCK_COUNT; block++)
@@ -189,6 +201,12 @@ static inline void tiny_model_make(int32_t level_count, int supports, tiny_file 
     memcpy(tiny_find(file, "/domains/fixed/level_offset")->data, offset[1], sizeof(int32_t) * (size_t)(level_count + 1));
     tiny_fill_floats(tiny_find(file, "/body/gravity/free"), 1);
     if (supports) tiny_fill_floats(tiny_find(file, "/body/gravity/fixed"), 2);
+    if (detail) {
+        memcpy(tiny_find(file, "/detail/level_count")->data, detail_levels, sizeof detail_levels);
+        tiny_fill_floats(tiny_find(file, "/detail/offset"), 3);
+        for (int32_t v = 0; v < detail_levels[1]; v++)
+            ((int32_t *)tiny_find(file, "/detail/source_index")->data)[v] = v < 6 ? 5 - v : -1;
+    }
     tiny_section *text = tiny_find(file, "/provenance/text");
     memset(text->data, '\n', text->bytes);
     memcpy(text->data, tiny_provenance, sizeof tiny_provenance - 1);

@@ -43,22 +43,19 @@ typedef struct pliant_loop_limit {
 // step_count, ordered as in hierarchy.h, the vertices of a level before those that the next one
 // adds; all are checked or made by refine.h. Read during the call only. PLIANT_ERR_MEMORY also for
 // meshes whose rows would be long: valences of hundreds, which cost their square.
-PLIANT_UNUSED_RESULT pliant_status pliant_loop_limit_create(int32_t step_count,
-                                                            int32_t vertex_count,
-                                                            int32_t face_count,
-                                                            const int32_t *const *faces,
-                                                            pliant_loop_limit **limit,
-                                                            pliant_error *err);
+PLIANT_UNUSED_RESULT pliant_status
+pliant_loop_limit_create(int32_t step_count, int32_t vertex_count, int32_t face_count,
+                         const int32_t *const *faces, pliant_loop_limit **limit, pliant_error *err);
 void pliant_loop_limit_destroy(pliant_loop_limit *limit);  // NULL is fine
 
 // Position and tangents of row `row`: point[0..2], [3..5] along, [6..8] across. `vertices` has
 // shape [control vertices][3].
-void pliant_loop_limit_evaluate(const pliant_loop_limit *limit, int32_t row,
-                                const double *vertices, double point[9]);
+void pliant_loop_limit_evaluate(const pliant_loop_limit *limit, int32_t row, const double *vertices,
+                                double point[9]);
 
-// The orthonormal frame of two tangents: frame[0..2] in the direction of `along`, [6..8] the normal,
-// [3..5] = normal x along. Returns the sine of the angle between the tangents, which says how well
-// the normal is determined: where it is not above 0 there is none.
+// The orthonormal frame of two tangents: frame[0..2] in the direction of `along`, [6..8] the
+// normal, [3..5] = normal x along. Returns the sine of the angle between the tangents, which says
+// how well the normal is determined: where it is not above 0 there is none.
 double pliant_loop_frame(const double *along, const double *across, double frame[9]);
 
 // Frames with a smaller sine are refused in a mesh at rest: in floats, the normal would be off by

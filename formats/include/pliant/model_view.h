@@ -27,6 +27,8 @@ typedef struct pliant_model_view {
     int32_t fixed_count;   // k
     int32_t has_supports;  // 1: the fixed blocks and gravity_fixed are stored
     uint64_t provenance_bytes;
+    int32_t detail_steps;         // D subdivision steps from level L to the detail; 0: none stored
+    int32_t detail_vertex_count;  // of the detailed surface
 
     // One pointer per row of PLIANT_MODEL_SECTIONS:
     const double *vertices;             // [n][3]
@@ -42,6 +44,10 @@ typedef struct pliant_model_view {
     const float *gravity_free;          // [m][3][3], transformed, per unit acceleration
     const float *gravity_fixed;         // [k][3][3]; NULL without supports
     const unsigned char *provenance;  // [provenance_bytes], "key = value" lines, no NUL at the end
+    // NULL without detail:
+    const int32_t *detail_level_count;   // [D + 1], vertices after each step; the first is n
+    const float *detail_offset;          // [detail_vertex_count][3]: tangential two, normal
+    const int32_t *detail_source_index;  // [detail_vertex_count], -1: made by subdivision
 
     pliant_greens_view greens[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
 } pliant_model_view;

@@ -53,12 +53,15 @@ typedef enum pliant_extent {
     PLIANT_EXTENT_NNZ,        // stored 3x3 blocks of a level's set
     PLIANT_EXTENT_FREE_3,     // 3m
     PLIANT_EXTENT_FIXED_3,    // 3k
+    PLIANT_EXTENT_DETAIL,     // vertices of the detailed surface
+    PLIANT_EXTENT_STEPS_1,    // D + 1, its subdivision steps + 1
     PLIANT_EXTENT_COUNT
 } pliant_extent;
 
 typedef enum pliant_presence {
     PLIANT_ALWAYS,
     PLIANT_WITH_SUPPORTS,  // when the fixed blocks are stored: all of these or none
+    PLIANT_WITH_DETAIL,    // when geometric detail is stored: all of these or none
 } pliant_presence;
 
 // X(field of pliant_model_view, path, type, rank, extents (1 beyond the rank), presence, unit)
@@ -75,7 +78,11 @@ typedef enum pliant_presence {
     X(fixed_level_offset, "/domains/fixed/level_offset", I4, 1, OFFSETS, 1, 1, ALWAYS, "position") \
     X(gravity_free, "/body/gravity/free", F4, 3, FREE, 3, 3, ALWAYS, "m per m/s^2")                \
     X(gravity_fixed, "/body/gravity/fixed", F4, 3, FIXED, 3, 3, WITH_SUPPORTS, "Pa per m/s^2")     \
-    X(provenance, "/provenance/text", U1, 1, TEXT, 1, 1, ALWAYS, "UTF-8")
+    X(provenance, "/provenance/text", U1, 1, TEXT, 1, 1, ALWAYS, "UTF-8")                          \
+    X(detail_level_count, "/detail/level_count", I4, 1, STEPS_1, 1, 1, WITH_DETAIL, "")            \
+    X(detail_offset, "/detail/offset", F4, 2, DETAIL, 3, 1, WITH_DETAIL, "m")                      \
+    X(detail_source_index, "/detail/source_index", I4, 1, DETAIL, 1, 1, WITH_DETAIL,               \
+      "vertex of the input")
 
 // X(field of pliant_greens_view, name below /greens/<block>/level<l>/, type, rank, extents)
 #define PLIANT_LEVEL_SECTIONS(X)                                                                   \
@@ -148,6 +155,8 @@ typedef struct pliant_model_layout {
     // Columns of a level's set: nodes of the domain with level <= l, level_offset[l + 1].
     int32_t free_columns[PLIANT_LEVEL_LIMIT + 1], fixed_columns[PLIANT_LEVEL_LIMIT + 1];
     uint64_t nnz[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
+    // Geometric detail: D subdivision steps above the finest level (0: none), vertices after them.
+    int32_t detail_steps, detail_vertex_count;
 } pliant_model_layout;
 
 // The sections of a model file in file order. `sections` has room for PLIANT_SECTION_LIMIT.
