@@ -22,6 +22,11 @@ static void print_text(const pliant_options *options, const pliant_run_summary *
 {
     printf("%s: %d vertices in %d level%s, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
            s->level_count, s->level_count == 1 ? "" : "s", s->free_count, s->fixed_count, s->file_bytes / 1e6);
+    if (s->detail_steps > 0)
+        printf("  detail       %d vertices, %d step%s finer; offsets %.3g (RMS), %.3g (largest), tangential part "
+               "%.3g, %.3g\n",
+               s->detail_vertex_count, s->detail_steps, s->detail_steps == 1 ? "" : "s", s->detail.rms,
+               s->detail.largest, s->detail.tangential_rms, s->detail.tangential_largest);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = s->levels.first; l <= s->levels.last; l++) {
             const pliant_compression_result *r = &s->results[b][l].compression;
@@ -78,9 +83,15 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
     print_json_text(options->output);
     printf(", \"vertices\": %d, \"faces\": %d, \"levels\": %d, \"free\": %d, \"fixed\": %d, \"components\": %d"
            ", \"ranks\": %d, \"solver\": \"%s\", \"volume\": %.9g, \"residual\": %.3g, \"memory_bytes\": %.0f"
-           ", \"file_bytes\": %.0f, \"blocks\": {",
+           ", \"file_bytes\": %.0f",
            s->vertex_count, s->face_count, s->level_count, s->free_count, s->fixed_count, s->component_count,
            s->ranks, s->solver, s->volume, s->residual, s->memory_bytes, s->file_bytes);
+    if (s->detail_steps > 0)
+        printf(", \"detail\": {\"steps\": %d, \"vertices\": %d, \"rms\": %.6g, \"largest\": %.6g, "
+               "\"tangential_rms\": %.6g, \"tangential_largest\": %.6g, \"least_sine\": %.3g}",
+               s->detail_steps, s->detail_vertex_count, s->detail.rms, s->detail.largest,
+               s->detail.tangential_rms, s->detail.tangential_largest, s->detail.least_sine);
+    printf(", \"blocks\": {");
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
         if (s->results[b][s->levels.last].compression.dense == 0) continue;
         if (b > 0) printf(", ");

@@ -152,6 +152,14 @@ static pliant_status write_mesh(pliant_writer *writer, const pliant_greens *g,
         const pliant_status status = pliant_writer_write_all(writer, sections[i].path, sections[i].data, err);
         if (status < 0) return status;
     }
+    if (p->relief) {
+        const pliant_relief *r = p->relief;
+        pliant_status status = pliant_writer_write_all(writer, "/detail/level_count", r->vertex_count, err);
+        if (status == PLIANT_OK) status = pliant_writer_write_all(writer, "/detail/offset", r->offset, err);
+        if (status == PLIANT_OK)
+            status = pliant_writer_write_all(writer, "/detail/source_index", r->source_index, err);
+        if (status < 0) return status;
+    }
     if (options->blocks == PLIANT_BLOCKS_ALL) {
         const pliant_status status = pliant_writer_write_all(writer, "/body/gravity/fixed", g->gravity_fixed, err);
         if (status < 0) return status;
@@ -178,6 +186,10 @@ static pliant_status create(const char *path, const pliant_greens *g, const plia
                                   .fixed_count = p->fixed_count,
                                   .text_bytes = strlen(provenance),
                                   .has_supports = options->blocks == PLIANT_BLOCKS_ALL};
+    if (p->relief) {
+        layout.detail_steps = p->relief->step_count;
+        layout.detail_vertex_count = p->relief->vertex_count[p->relief->step_count];
+    }
     for (int32_t l = 0; l <= finest; l++) {
         layout.free_columns[l] = p->free_hats->level_offset[l + 1];
         layout.fixed_columns[l] = p->fixed_hats->level_offset[l + 1];

@@ -26,6 +26,9 @@ static const char help[] =
     "  --scheme SCHEME         loop, butterfly or midpoint (default loop)\n"
     "                          Without --subdivide, MESH is the finest level and its subdivision\n"
     "                          connectivity is detected, whatever its vertex order.\n"
+    "  --detail D              the D finest levels are geometric detail: elasticity is solved on the mesh\n"
+    "                          of the others, the finer shape is stored as a displaced subdivision\n"
+    "                          surface that moves with it\n"
     "Support\n"
     "  --fixed EXPR            hold the vertices where EXPR is true at rest: z<0.1, x>=2 and y<0,\n"
     "                          all(z<0.1, x>0), any(...), not(...), box(x0,y0,z0, x1,y1,z1),\n"
@@ -76,6 +79,7 @@ const char *pliant_options_help(void)
 enum {
     OPTION_SUBDIVIDE = 256,
     OPTION_SCHEME,
+    OPTION_DETAIL,
     OPTION_FIXED,
     OPTION_FIXED_LIST,
     OPTION_YOUNG,
@@ -99,6 +103,7 @@ enum {
 static const struct option long_options[] = {
     {"subdivide", required_argument, NULL, OPTION_SUBDIVIDE},
     {"scheme", required_argument, NULL, OPTION_SCHEME},
+    {"detail", required_argument, NULL, OPTION_DETAIL},
     {"fixed", required_argument, NULL, OPTION_FIXED},
     {"fixed-list", required_argument, NULL, OPTION_FIXED_LIST},
     {"young", required_argument, NULL, OPTION_YOUNG},
@@ -221,6 +226,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             o.scheme = (pliant_subdivision_scheme)choice;
             scheme_given = 1;
             break;
+        case OPTION_DETAIL: status = pliant_option_integer("--detail", optarg, 1, PLIANT_LEVEL_LIMIT, &o.detail, err); break;
         case OPTION_WAVELET:
             status = word("--wavelet", optarg, wavelets, 2, &choice, err);
             o.wavelet.scheme = (pliant_wavelet_scheme)choice;
@@ -269,6 +275,9 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     }
     if (scheme_given && o.subdivide < 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--scheme goes with --subdivide L");
+    if (o.subdivide >= 0 && o.detail > o.subdivide)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--detail: expected at most the %d levels of --subdivide, found %d",
+                                o.subdivide, o.detail);
     if (o.compression.eps > 0 && (o.compression.rms > 0 || o.compression.max > 0))
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "--eps is a threshold, --rms and --max are errors to stay under: give one kind");

@@ -35,6 +35,7 @@ typedef struct pliant_options {
     const char *mesh, *output, *dense;  // dense NULL: none
     int32_t subdivide;                  // -1: detect the levels of the mesh
     pliant_subdivision_scheme scheme;
+    int32_t detail;                     // finest levels that are geometry only
     const char *fixed_expression, *fixed_list;  // either may be NULL
     pliant_material material;
     pliant_wavelet_def wavelet;

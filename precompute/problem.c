@@ -35,12 +35,22 @@ static pliant_status hold_listed(const pliant_multires *multires, int32_t input_
     return status;
 }
 
+// Weights of the limit surface while detail is measured, twelve a vertex on two levels, and faces.
+static const double detail_bytes = 1200;
+
 // A deep subdivision is refused before it is made: the dense system of its vertices is what counts.
 static pliant_status check_size(const pliant_mesh *base, const pliant_options *options, pliant_error *err)
 {
     // Every level has four faces for one; a closed surface has about half as many vertices as faces.
-    const double vertices = ldexp(base->face_count, 2 * options->subdivide) / 2;
-    const double needed = 2 * 9 * vertices * vertices * sizeof(double), available = pliant_node_available();
+    const double detailed = ldexp(base->face_count, 2 * options->subdivide) / 2;
+    const double vertices = ldexp(detailed, -2 * options->detail), available = pliant_node_available();
+    const double needed = 2 * 9 * vertices * vertices * sizeof(double);
+    if (options->detail > 0 && available > 0 && detailed * detail_bytes > available)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "--subdivide %d --detail %d: makes %.3g vertices, which need %.3g GB of "
+                                "memory (%.1f GB are available here): use fewer levels",
+                                options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
+                                available / 1e9);
     if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
     return pliant_error_set(err, PLIANT_ERR_MEMORY,
                             "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
@@ -48,10 +58,10 @@ static pliant_status check_size(const pliant_mesh *base, const pliant_options *o
                             options->subdivide, vertices, needed / 1e9, available / 1e9);
 }
 
-// Everything that only one rank needs to do: read, check, refine or detect, hold.
+// Everything that only one rank needs to do: read, check, refine or detect, take detail off, hold.
 static pliant_status pose(const pliant_options *options, pliant_progress *progress,
-                          pliant_multires **multires, uint8_t **held, pliant_mesh_report *report,
-                          pliant_error *err)
+                          pliant_multires **multires, pliant_relief **relief, uint8_t **held,
+                          pliant_mesh_report *report, pliant_error *err)
 {
     pliant_mesh *mesh = NULL;
     pliant_status status = pliant_mesh_file_read(options->mesh, &mesh, err);
@@ -66,6 +76,8 @@ static pliant_status pose(const pliant_options *options, pliant_progress *progre
     status = options->subdivide >= 0
                  ? pliant_multires_subdivide(mesh, options->subdivide, options->scheme, multires, err)
                  : pliant_multires_detect(mesh, multires, err);
+    if (status == PLIANT_OK && options->detail > 0)
+        status = pliant_relief_split(multires, options->detail, relief, err);
     if (status < 0) {
         // The room of meshes does not know the file's name.
         const pliant_error inner = *err;
@@ -184,7 +196,7 @@ PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *option
     *problem = p;  // from here on destroy frees whatever there is
     pliant_mesh_report report = {0};
     pliant_status status = PLIANT_OK;
-    if (rank == 0) status = pose(options, progress, &p->multires, &p->held, &report, err);
+    if (rank == 0) status = pose(options, progress, &p->multires, &p->relief, &p->held, &report, err);
     PliantCall(comm, status, err);
     PetscCall(share(comm, rank, &p->multires, &p->held, &report, err));
     p->component_count = report.component_count;
@@ -209,6 +221,7 @@ PetscErrorCode pliant_problem_destroy(pliant_problem **problem)
     free(p->fixed_nodes);
     free(p->free_nodes);
     free(p->held);
+    pliant_relief_destroy(p->relief);
     pliant_multires_destroy(p->multires);
     PetscCall(PetscFree(*problem));
     PetscFunctionReturn(0);

@@ -1,6 +1,7 @@
 // problem.h: the reference boundary value problem: surface, levels, support, domains (GF 3.2.1).
 #pragma once
 
+#include "mesh/relief.h"
 #include "options.h"
 #include "progress.h"
 
@@ -10,6 +11,7 @@
 
 typedef struct pliant_problem {
     pliant_multires *multires;
+    pliant_relief *relief;     // --detail: what was taken off the mesh; on the first rank, else NULL
     pliant_hierarchy *hierarchy;
     int32_t vertex_count;      // n
     uint8_t *held;             // [n] 1 at fixed nodes

@@ -207,6 +207,9 @@ static void write_provenance(const pliant_run_summary *s, const pliant_problem *
              "asked_eps = %.9g\n"
              "asked_rms = %.9g\n"
              "asked_max = %.9g\n"
+             "detail_steps = %d\n"
+             "detail_rms = %.6g\n"
+             "detail_tangential_rms = %.6g\n"
              "residual = %.3g\n"
              "seconds_read = %.3f\n"
              "seconds_assemble = %.3f\n"
@@ -217,7 +220,8 @@ static void write_provenance(const pliant_run_summary *s, const pliant_problem *
              PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh,
              (unsigned long long)p->mesh_hash, comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc,
              major, minor, release, s->ranks, s->solver, s->levels.first, s->levels.last, options->compression.eps,
-             options->compression.rms, options->compression.max, s->residual, s->times.read,
+             options->compression.rms, options->compression.max, s->detail_steps, s->detail.rms,
+             s->detail.tangential_rms, s->residual, s->times.read,
              s->times.assemble, s->times.factor, s->times.solve, s->times.transform, s->times.compress);
 }
 
@@ -255,6 +259,11 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     s->fixed_count = p->fixed_count;
     s->component_count = p->component_count;
     s->volume = p->volume;
+    if (p->relief) {
+        s->detail_steps = p->relief->step_count;
+        s->detail_vertex_count = p->relief->vertex_count[s->detail_steps];
+        s->detail = p->relief->size;
+    }
     s->levels = p->levels;
     status = check_levels(p, options, err);
     s->misused = status < 0;

@@ -10,6 +10,8 @@ typedef struct pliant_run_times {
 
 typedef struct pliant_run_summary {
     int32_t vertex_count, face_count, level_count, free_count, fixed_count, component_count, ranks;
+    int32_t detail_steps, detail_vertex_count;  // 0 without --detail; on the first rank
+    pliant_relief_size detail;
     const char *solver;            // "node" or "scalapack"
     double volume, residual, memory_bytes, file_bytes;
     pliant_level_range levels;  // stored
