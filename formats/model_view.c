@@ -218,6 +218,25 @@ static pliant_status check_level_offsets(const binding *b, const pliant_section 
     return PLIANT_OK;
 }
 
+// The model's vertices come first, and from the same vertices of the input.
+static pliant_status check_detail_source(const binding *b, pliant_error *err)
+{
+    const pliant_model_view *v = b->view;
+    if (!b->is_there[PLIANT_WITH_DETAIL]) return PLIANT_OK;
+    const pliant_status status =
+        pliant_bind_indices(b->reader, b->section.detail_source_index, -1, (int64_t)INT32_MAX + 1,
+                            PLIANT_ANY_ORDER, err);
+    if (status < 0) return status;
+    for (int32_t i = 0; i < v->vertex_count; i++)
+        if (v->detail_source_index[i] != v->source_index[i])
+            return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                    "%s: /detail/source_index: element %d: expected %d as in "
+                                    "/mesh/source_index, found %d",
+                                    b->name, (int)i, (int)v->source_index[i],
+                                    (int)v->detail_source_index[i]);
+    return PLIANT_OK;
+}
+
 // UTF-8 without control characters: tools print it.
 static pliant_status check_text(const binding *b, pliant_error *err)
 {
@@ -263,9 +282,7 @@ static pliant_status check_contents(const binding *b, pliant_error *err)
     if (status == PLIANT_OK)
         status = check_level_offsets(b, b->section.fixed_level_offset, v->fixed_nodes,
                                      v->fixed_count, err);
-    if (status == PLIANT_OK && b->section.detail_source_index)
-        status = pliant_bind_indices(b->reader, b->section.detail_source_index, -1,
-                                     (int64_t)INT32_MAX + 1, PLIANT_ANY_ORDER, err);
+    if (status == PLIANT_OK) status = check_detail_source(b, err);
     if (status == PLIANT_OK) status = check_text(b, err);
     return status;
 }

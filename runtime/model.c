@@ -228,6 +228,8 @@ pliant_model_info pliant_model_describe(const pliant_model *model)
         .has_supports = view->has_supports,
         .coarsest_constraint_level = model->coarsest_stored,
         .finest_constraint_level = model->finest_stored,
+        .detail_steps = view->detail_steps,
+        .detail_vertex_count = view->detail_vertex_count,
     };
 }
 

@@ -172,6 +172,7 @@ static void wrong_numbers_are_refused_by_section_and_element(void **state)
         {"/detail/level_count", 1, 257, "/detail/level_count: element 1: expected 258 vertices, found 257"},
         {"/detail/level_count", 1, -1, "/detail/level_count: element 1: expected 258 vertices, found -1"},
         {"/detail/offset", 100, NAN, "/detail/offset: element 100: expected a finite number, found nan"},
+        {"/detail/source_index", 3, 1, "/detail/source_index: element 3: expected 2 as in /mesh/source_index, found 1"},
         {"/detail/source_index", -1, -2, "/detail/source_index: element 257: expected -1 to 2147483647, found -2"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {

@@ -16,7 +16,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#define KIND_COUNT 4
+#define KIND_COUNT 6
 
 typedef struct seed {
     unsigned char *bytes;
@@ -32,7 +32,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void make_seed(int kind, seed *s)
 {
-    s->bytes = kind < 2 ? image_of_model(2, kind, &s->size) : image_of_dense(kind - 2, &s->size);
+    // Models without and with supports, dense files likewise, models with detail.
+    s->bytes = kind == 2 || kind == 3 ? image_of_dense(kind - 2, &s->size)
+                                      : image_of_model(2, kind < 2 ? kind : kind - 2, &s->size);
     const pliant_header *header = (const pliant_header *)s->bytes;
     const pliant_entry *entries = (const pliant_entry *)(s->bytes + sizeof *header);
     s->spans[s->span_count++] =
@@ -97,6 +99,36 @@ static unsigned char *spread_out(const seed *s, const uint8_t *data, size_t size
     return bytes;
 }
 
+// What a file says of detail is evaluated: the exact size of every array shows one element too far.
+static void evaluate_detail(const pliant_model *model, int32_t level)
+{
+    pliant_error err;
+    pliant_detail *detail;
+    if (pliant_detail_create(model, level, &detail, &err) < 0) {
+        if (strchr(err.text, '\n')) abort();
+        return;
+    }
+    const pliant_detail_info info = pliant_detail_describe(detail);
+    const size_t n = (size_t)info.vertex_count, controls = (size_t)info.control_count;
+    pliant_vec3 *u = calloc(controls, sizeof *u), *positions = malloc(n * sizeof *positions);
+    pliant_vec3 *normals = malloc(n * sizeof *normals);
+    int32_t *support = malloc(controls * sizeof *support);
+    int32_t support_count = 0;
+    const int32_t last = info.vertex_count - 1;
+    if (!u || !positions || !normals || !support) abort();
+    u[0].x = u[controls - 1].y = 1;
+    if (pliant_detail_evaluate(detail, u, positions, normals) < 0) abort();
+    if (pliant_detail_points(detail, u, &last, 1, positions, normals) < 0) abort();
+    if (pliant_detail_support(detail, &last, 1, support, info.control_count, &support_count) < 0)
+        abort();
+    if (pliant_detail_interpolate(detail, 3, &u[0].x, &positions[0].x) < 0) abort();
+    free(support);
+    free(normals);
+    free(positions);
+    free(u);
+    pliant_detail_destroy(detail);
+}
+
 // Through the library's front door, from a file that lives in memory.
 static void open_model(const unsigned char *bytes, size_t size)
 {
@@ -106,7 +138,10 @@ static void open_model(const unsigned char *bytes, size_t size)
     const int file = memfd_create("model", MFD_CLOEXEC);
     if (file < 0 || write(file, bytes, size) != (ssize_t)size) abort();
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    if (pliant_model_open(path, &model, &err) == PLIANT_OK) pliant_model_close(model);
+    if (pliant_model_open(path, &model, &err) == PLIANT_OK) {
+        for (int32_t level = 0; level < 2; level++) evaluate_detail(model, level);
+        pliant_model_close(model);
+    }
     close(file);
 }
 

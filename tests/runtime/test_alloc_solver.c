@@ -158,11 +158,53 @@ static void frames_of_all_kinds_allocate_nothing(void **state)
     pliant_model_close(model);
 }
 
+static void detailed_surfaces_and_points_allocate_nothing(void **state)
+{
+    (void)state;
+    if (!COUNTING) skip();
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/pliant_test_alloc_%d.h5", (int)getpid());
+    check_synthetic *body =
+        check_synthetic_create(&(check_synthetic_def){.levels = 1,
+                                                      .wavelet = pliant_wavelet_default(),
+                                                      .blocks = CHECK_FREE_BLOCK});
+    check_synthetic_roughen(body, 2);
+    check_synthetic_write(body, path);
+    check_synthetic_destroy(body);
+    pliant_error err = {""};
+    pliant_model *model = NULL;
+    pliant_detail *detail = NULL;
+    check_ok(pliant_model_open(path, &model, &err), &err);
+    unlink(path);
+    check_ok(pliant_detail_create(model, 1, &detail, &err), &err);
+    const pliant_detail_info info = pliant_detail_describe(detail);
+    static pliant_vec3 u[42], positions[642], normals[642], carried[642];
+    assert_int_equal(info.control_count, 42);
+    assert_int_equal(info.vertex_count, 642);
+    check_random random = check_random_seed(2);
+    const long before = atomic_load(&calls);
+    for (int frame = 0; frame < 50; frame++) {
+        for (int32_t v = 0; v < 42; v++)
+            u[v].x = (frame % 10 == 9 ? 10 : 0.1f) * (float)check_random_next(&random);
+        int32_t vertices[40], support[42], support_count;
+        for (int i = 0; i < 40; i++) vertices[i] = check_random_index(&random, 642);
+        assert_true(pliant_detail_evaluate(detail, u, positions, normals) >= 0);
+        assert_true(pliant_detail_points(detail, u, vertices, 40, positions, normals) >= 0);
+        assert_int_equal(pliant_detail_support(detail, vertices, 40, support, 42, &support_count),
+                         PLIANT_OK);
+        assert_int_equal(pliant_detail_interpolate(detail, 3, &u[0].x, &carried[0].x), PLIANT_OK);
+    }
+    assert_int_equal(atomic_load(&calls) - before, 0);
+    pliant_detail_destroy(detail);
+    pliant_model_close(model);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(frames_of_all_kinds_allocate_nothing),
+        cmocka_unit_test(detailed_surfaces_and_points_allocate_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

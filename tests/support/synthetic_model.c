@@ -1,6 +1,7 @@
 // synthetic_model.c: models with exactly known answers, for tests that need a model file.
 #include "synthetic_model.h"
 
+#include "pliant/loop.h"
 #include "pliant/writer.h"
 
 #include <math.h>
@@ -391,6 +392,20 @@ static void free_columns(check_compressed *columns)
     free(columns->block);
 }
 
+void check_synthetic_roughen(check_synthetic *s, int32_t steps)
+{
+    const int32_t control_count = s->surface.mesh->vertex_count;
+    s->detail_steps = steps;
+    s->shape = check_sphere(s->def.levels + steps);
+    assert_memory_equal(s->shape.mesh->vertices, s->surface.mesh->vertices,
+                        3 * (size_t)control_count * sizeof(double));
+    for (int32_t v = control_count; v < s->shape.mesh->vertex_count; v++) {
+        double *x = s->shape.mesh->vertices + 3 * (size_t)v;
+        const double radius = 1 + 0.03 * sin(9 * x[0] + 7 * x[1] + 5 * x[2]);
+        for (int c = 0; c < 3; c++) x[c] *= radius;
+    }
+}
+
 void check_synthetic_destroy(check_synthetic *s)
 {
     if (!s) return;
@@ -410,6 +425,7 @@ void check_synthetic_destroy(check_synthetic *s)
     }
     free(s->stiffness);
     pliant_hierarchy_destroy(s->hierarchy);
+    if (s->shape.mesh) check_surface_destroy(&s->shape);
     check_surface_destroy(&s->surface);
     free(s);
 }
@@ -447,6 +463,40 @@ static void write_level(const check_synthetic *s, pliant_writer *writer, int32_t
              &err);
 }
 
+// Offsets of the finer shape from the limit surface, in its frames.
+static void write_detail(const check_synthetic *s, pliant_writer *writer)
+{
+    pliant_hierarchy *h = check_hierarchy(&s->shape);
+    const int32_t levels = s->def.levels, count = s->shape.mesh->vertex_count;
+    pliant_loop_limit *limit = NULL;
+    pliant_error err = {""};
+    check_ok(pliant_loop_limit_create(s->detail_steps, h->vertex_count[levels], h->face_count[levels],
+                                      h->faces + levels, &limit, &err),
+             &err);
+    float *offset = take(3 * (size_t)count, sizeof *offset);
+    int32_t *source = take((size_t)count, sizeof *source);
+    for (int32_t v = 0; v < count; v++) {
+        const double *x = s->shape.mesh->vertices + 3 * (size_t)v;
+        double point[9], frame[9];
+        pliant_loop_limit_evaluate(limit, v, s->surface.mesh->vertices, point);
+        check_at_least(pliant_loop_frame(point + 3, point + 6, frame), PLIANT_LOOP_LEAST_SINE);
+        for (int a = 0; a < 3; a++) {
+            double sum = 0;
+            for (int c = 0; c < 3; c++) sum += frame[3 * a + c] * (x[c] - point[c]);
+            offset[3 * (size_t)v + (size_t)a] = (float)sum;
+        }
+        const int32_t control_count = h->vertex_count[levels];
+        source[v] = v < control_count ? control_count - 1 - v : v;
+    }
+    put(writer, "/detail/level_count", h->vertex_count + levels);
+    put(writer, "/detail/offset", offset);
+    put(writer, "/detail/source_index", source);
+    free(source);
+    free(offset);
+    pliant_loop_limit_destroy(limit);
+    pliant_hierarchy_destroy(h);
+}
+
 void check_synthetic_write(const check_synthetic *s, const char *path)
 {
     static const char provenance[] = "generator = tests/support/synthetic_model\n";
@@ -462,6 +512,8 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
         .text_bytes = sizeof provenance - 1,
         .has_supports = s->def.blocks == CHECK_ALL_BLOCKS,
         .level_mask = s->def.level_mask ? s->def.level_mask : 1u << s->def.levels,
+        .detail_steps = s->detail_steps,
+        .detail_vertex_count = s->detail_steps ? s->shape.mesh->vertex_count : 0,
     };
     for (int32_t l = 0; l < surface->level_count; l++) {
         layout.free_columns[l] = s->wavelets[0]->level_offset[l + 1];
@@ -499,6 +551,7 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
     for (int32_t block = 0; block < block_count(s); block++)
         for (int32_t l = 0; l <= s->def.levels; l++)
             if (is_stored(s, l)) write_level(s, writer, block, l);
+    if (s->detail_steps) write_detail(s, writer);
     check_ok(pliant_writer_write_provenance(writer, provenance, &err), &err);
     check_ok(pliant_writer_commit(writer, &err), &err);
 }

@@ -66,10 +66,16 @@ typedef struct check_synthetic {
     double *coarse_xi[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
     check_compressed coarse[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
     float *gravity_coefficients[2];  // shape [m][3][3], [k][3][3]
+    // After check_synthetic_roughen: steps to the finer shape, and that; else 0, mesh NULL.
+    int32_t detail_steps;
+    check_surface shape;
 } check_synthetic;
 
 check_synthetic *check_synthetic_create(const check_synthetic_def *def);
 void check_synthetic_destroy(check_synthetic *synthetic);
+// Give the body geometric detail, which its file then holds: a shape of `steps` levels more, with
+// waves that leave the model's own vertices where they are.
+void check_synthetic_roughen(check_synthetic *synthetic, int32_t steps);
 
 void check_synthetic_write(const check_synthetic *synthetic, const char *path);
 void check_synthetic_write_dense(const check_synthetic *synthetic, const char *path);

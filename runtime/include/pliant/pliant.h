@@ -36,6 +36,7 @@ typedef struct pliant_model_info {
     double rms, max, factor;  // of the free-free block: GF-70, GF-71, dense blocks / kept blocks
     int32_t has_supports;     // 1: fixed columns and rows are stored (--blocks all)
     int32_t coarsest_constraint_level, finest_constraint_level;  // stored Green's functions
+    int32_t detail_steps, detail_vertex_count;  // of the finer shape (--detail); 0: none stored
 } pliant_model_info;
 PLIANT_API pliant_model_info pliant_model_describe(const pliant_model *model);
 
@@ -207,3 +208,58 @@ PLIANT_API pliant_solver_report pliant_solver_last(const pliant_solver *solver);
 // that contact through these nodes has ended.
 PLIANT_CALL pliant_status pliant_solver_compliance(pliant_solver *solver, const pliant_node *nodes,
                                                    int32_t count, double *matrix);
+
+// ---- Detail ----
+
+// A finer shape that moves with the elastic surface (GF 9.2): a displaced subdivision surface, whose
+// control mesh is a level of the model. Evaluating is linear in what is asked for, on the state of
+// no solver: u comes from pliant_solver_surface, or is NULL for the shape at rest. A detail is const
+// after create, and threads may share it; the model must outlive it.
+//
+// Vertices 0 .. n-1 of the detail are those of the model, where these are at rest. They do not
+// follow it exactly: Loop's rule averages, so that a displacement prescribed at one vertex moves the
+// detail there by half of it and half of what its neighbours do.
+typedef struct pliant_detail pliant_detail;
+
+// Over the mesh of level `level`, with u that level's displacements; pliant_model_describe's
+// level_count - 1 is the finest, on which the detail is defined. Coarser ones carry the same shape
+// at rest on fewer numbers. PLIANT_ERR_MISSING: the file has none. PLIANT_ERR_FORMAT: the surface
+// has no normal at some vertex.
+PLIANT_CALL pliant_status pliant_detail_create(const pliant_model *model, int32_t level,
+                                               pliant_detail **detail, pliant_error *err);
+PLIANT_API void pliant_detail_destroy(pliant_detail *detail);  // NULL is fine
+
+typedef struct pliant_detail_info {
+    int32_t level;          // of the control mesh
+    int32_t control_count;  // its vertices: u has shape [control_count]
+    int32_t vertex_count, face_count;
+} pliant_detail_info;
+PLIANT_API pliant_detail_info pliant_detail_describe(const pliant_detail *detail);
+// Triangles, shape [face_count][3], counterclockwise from outside; borrowed until destroy.
+PLIANT_API const int32_t *pliant_detail_faces(const pliant_detail *detail);
+// Vertex of the input mesh, -1: made by subdivision; shape [vertex_count], borrowed until the model
+// is closed.
+PLIANT_API const int32_t *pliant_detail_source_index(const pliant_detail *detail);
+
+// The whole detailed surface: positions[vertex_count], m, and unit normals[vertex_count] (NULL: not
+// wanted), the mean of the surrounding triangles' normals weighted by area. PLIANT_ROUGH: folded so
+// that the subdivision surface has no normal at some vertex; there the offset keeps the direction
+// it has at rest. Finite as long as u is within 1e9 times the size of the model.
+PLIANT_CALL pliant_status pliant_detail_evaluate(const pliant_detail *detail, const pliant_vec3 *u,
+                                                 pliant_vec3 *positions, pliant_vec3 *normals);
+// Chosen vertices only, the same to rounding: positions[count], normals[count] (or NULL; a normal
+// costs as much as its neighbours' positions). u still has shape [control_count], but is read only
+// at the control vertices that pliant_detail_support names.
+PLIANT_CALL pliant_status pliant_detail_points(const pliant_detail *detail, const pliant_vec3 *u,
+                                               const int32_t *vertices, int32_t count,
+                                               pliant_vec3 *positions, pliant_vec3 *normals);
+// The control vertices that points and normals of these vertices depend on: control[*control_count],
+// ascending, some 12 to 20 for one vertex. PLIANT_ERR_CAPACITY: there are more than `capacity`.
+PLIANT_CALL pliant_status pliant_detail_support(const pliant_detail *detail,
+                                                const int32_t *vertices, int32_t count,
+                                                int32_t *control, int32_t capacity,
+                                                int32_t *control_count);
+// Carry numbers that belong to the control vertices to the detail's, by the weights of the limit
+// surface: values[control_count][width] to result[vertex_count][width].
+PLIANT_CALL pliant_status pliant_detail_interpolate(const pliant_detail *detail, int32_t width,
+                                                    const float *values, float *result);
