@@ -45,8 +45,9 @@ static inline pliant_vec3 normal_of(pliant_vec3 c, pliant_vec3 a, pliant_vec3 b,
 
 // ---- Positions ----
 
-// Points that are evaluated together, in one array for each number, so that frames vectorise.
-enum { BLOCK = 32 };
+// Points that are evaluated together, in one array for each number, so that frames vectorise: on
+// whole groups, in which the last point is repeated.
+enum { BLOCK = 32, GROUP = 16 };
 typedef struct block {
     int32_t vertex[BLOCK];
     float point[3][BLOCK], along[3][BLOCK], across[3][BLOCK], offset[3][BLOCK];
@@ -98,10 +99,10 @@ static inline int has_normal(float tt, float bb, float nn)
 
 // result = point + frame times offset. Returns 0 when some vertex has no frame.
 PLIANT_VECTOR_CLONES
-static int displace(block *b, float (*restrict result)[BLOCK])
+static int displace(const block *b, int32_t count, float (*restrict result)[BLOCK])
 {
     int bad = 0;
-    for (int i = 0; i < BLOCK; i++) {
+    for (int32_t i = 0; i < count; i++) {
         const float tx = b->along[0][i], ty = b->along[1][i], tz = b->along[2][i];
         const float bx = b->across[0][i], by = b->across[1][i], bz = b->across[2][i];
         const float nx = ty * bz - tz * by, ny = tz * bx - tx * bz, nz = tx * by - ty * bx;
@@ -121,9 +122,9 @@ static int displace(block *b, float (*restrict result)[BLOCK])
 }
 
 // Where the deformed surface has no normal the frame at rest stands in.
-static void repair(const pliant_detail *d, block *b)
+static void repair(const pliant_detail *d, int32_t count, block *b)
 {
-    for (int32_t i = 0; i < BLOCK; i++) {
+    for (int32_t i = 0; i < count; i++) {
         const float *rest = d->rest + 12 * (size_t)b->vertex[i];
         const pliant_vec3 t = {b->along[0][i], b->along[1][i], b->along[2][i]};
         const pliant_vec3 s = {b->across[0][i], b->across[1][i], b->across[2][i]};
@@ -141,8 +142,9 @@ static void repair(const pliant_detail *d, block *b)
 static pliant_status place(const pliant_detail *d, const pliant_vec3 *u, int32_t count, block *b,
                            float (*result)[BLOCK])
 {
+    const int32_t padded = (count + GROUP - 1) / GROUP * GROUP;
     gather(d, u, count, b);
-    for (int32_t i = count; i < BLOCK; i++) {
+    for (int32_t i = count; i < padded; i++) {
         b->vertex[i] = b->vertex[count - 1];
         for (int c = 0; c < 3; c++) {
             b->point[c][i] = b->point[c][count - 1];
@@ -151,9 +153,9 @@ static pliant_status place(const pliant_detail *d, const pliant_vec3 *u, int32_t
             b->offset[c][i] = b->offset[c][count - 1];
         }
     }
-    if (displace(b, result)) return PLIANT_OK;
-    repair(d, b);
-    (void)displace(b, result);
+    if (displace(b, padded, result)) return PLIANT_OK;
+    repair(d, padded, b);
+    (void)displace(b, padded, result);
     return PLIANT_ROUGH;
 }
 
