@@ -180,8 +180,8 @@ static pliant_status allocate(pliant_vtk_series *series, const pliant_vtk_series
     series->target = malloc(series->path_size);
     series->polys = malloc(base64_size(8 + 12 * faces) + base64_size(8 + 4 * faces) + TEXT_LIMIT);
     series->values = malloc(12 * n + 1);
-    // Three vector fields, the cells and the text around them.
-    series->text_capacity = 3 * base64_size(8 + 12 * n) + base64_size(8 + 12 * faces) +
+    // Four vector fields, the cells and the text around them.
+    series->text_capacity = 4 * base64_size(8 + 12 * n) + base64_size(8 + 12 * faces) +
                             base64_size(8 + 4 * faces) + (size_t)4 * TEXT_LIMIT;
     series->text = malloc(series->text_capacity);
     if (!series->folder || !series->work || !series->path || !series->target || !series->polys ||
@@ -286,7 +286,7 @@ static void load(float *values, const pliant_vec3 *u, size_t count)
 
 // One step's file as text; returns its size.
 static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement,
-                      const pliant_vec3 *traction)
+                      const pliant_vec3 *traction, const pliant_vec3 *normals)
 {
     const size_t n = (size_t)series->vertex_count;
     float *values = series->values;
@@ -297,7 +297,8 @@ static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement
                     "NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
                     "NumberOfStrips=\"0\" NumberOfPolys=\"%zu\">\n",
                     byte_order, n, (size_t)series->face_count);
-    text = put(text, "<PointData Vectors=\"displacement\">\n");
+    text = put(text, normals ? "<PointData Vectors=\"displacement\" Normals=\"normal\">\n"
+                             : "<PointData Vectors=\"displacement\">\n");
     load(values, displacement, n);
     text = put_array(text,
                      "<DataArray type=\"Float32\" Name=\"displacement\" "
@@ -308,6 +309,13 @@ static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement
                      "<DataArray type=\"Float32\" Name=\"traction\" "
                      "NumberOfComponents=\"3\" format=\"binary\">",
                      values, 3 * n);
+    if (normals) {
+        load(values, normals, n);
+        text = put_array(text,
+                         "<DataArray type=\"Float32\" Name=\"normal\" "
+                         "NumberOfComponents=\"3\" format=\"binary\">",
+                         values, 3 * n);
+    }
     text = put(text, "</PointData>\n<Points>\n");
     load(values, displacement, n);
     for (size_t i = 0; i < 3 * n; i++) values[i] = (float)(series->positions[i] + values[i]);
@@ -348,12 +356,12 @@ static void name_step(char *path, size_t size, const char *folder, int64_t numbe
 
 pliant_status pliant_vtk_series_add(pliant_vtk_series *series, double time,
                                     const pliant_vec3 *displacement, const pliant_vec3 *traction,
-                                    pliant_error *err)
+                                    const pliant_vec3 *normals, pliant_error *err)
 {
     const int64_t number = series->step_count + 1;
     name_step(series->path, series->path_size, series->work, number);
     const pliant_status status =
-        write_file(series->path, series->text, compose(series, displacement, traction), err);
+        write_file(series->path, series->text, compose(series, displacement, traction, normals), err);
     if (status < 0) return status;
     series->step_count = number;
     fprintf(series->index, "<DataSet timestep=\"%.12g\" part=\"0\" file=\"" STEP_FORMAT "\"/>\n",

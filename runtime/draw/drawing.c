@@ -5,12 +5,14 @@
 #include "png_file.h"
 #include "raster.h"
 #include "recording.h"
+#include "skin.h"
 
 #include "pliant/error.h"
 #include "pliant/pliant.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define SINGLE_WIDTH  800  // pixels, of a picture with one panel
 #define LEGEND_HEIGHT 90   // pixels
@@ -85,10 +87,59 @@ static pliant_status make_panels(const pliant_draw_options *options, const plian
     return PLIANT_OK;
 }
 
+// What the detailed surface is held by: where the limit surface weighs held vertices by a half.
+static pliant_status hold_detail(const pliant_skin *skin, const uint8_t *held,
+                                 int32_t control_count, uint8_t *detail_held, pliant_error *err)
+{
+    float *values = malloc((size_t)control_count * sizeof *values);
+    float *carried = malloc((size_t)skin->vertex_count * sizeof *carried);
+    pliant_status status = PLIANT_OK;
+    if (!values || !carried)
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d vertices",
+                                  skin->vertex_count);
+    for (int32_t v = 0; v < control_count && status == PLIANT_OK; v++) values[v] = held[v];
+    if (status == PLIANT_OK) status = pliant_detail_interpolate(skin->detail, 1, values, carried);
+    for (int32_t v = 0; v < skin->vertex_count && status == PLIANT_OK; v++)
+        detail_held[v] = carried[v] >= 0.5f;
+    free(carried);
+    free(values);
+    return status;
+}
+
+// Draw the detailed surface in place of the one it goes with: the body's shape, and every panel's
+// displacements. `dressed`, to be freed, takes these and who is held.
+static pliant_status dress(pliant_skin *skin, pliant_body_shape *shape, pliant_panel *panels,
+                           int32_t panel_count, void **dressed, pliant_error *err)
+{
+    const size_t n = (size_t)skin->vertex_count, count = (size_t)panel_count;
+    pliant_vec3 *moved = malloc(count * n * sizeof *moved + n);
+    if (!moved)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d panels of %d vertices",
+                                panel_count, skin->vertex_count);
+    *dressed = moved;
+    uint8_t *held = (uint8_t *)(moved + count * n);
+    const pliant_status status = hold_detail(skin, shape->held, shape->vertex_count, held, err);
+    if (status < 0) return status;
+    for (size_t k = 0; k < count; k++, moved += n) {
+        if (!panels[k].displacement) continue;
+        pliant_skin_move(skin, panels[k].displacement);
+        memcpy(moved, skin->displacement, n * sizeof *moved);
+        panels[k].displacement = moved;
+    }
+    *shape = (pliant_body_shape){.vertex_count = skin->vertex_count,
+                                 .face_count = skin->face_count,
+                                 .rest = skin->rest,
+                                 .faces = skin->faces,
+                                 .held = held};
+    return PLIANT_OK;
+}
+
 pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_error *err)
 {
     pliant_model *model = NULL;
     pliant_recording *recording = NULL;
+    pliant_skin *skin = NULL;
+    void *dressed = NULL;
     uint8_t *held = NULL, *rgb = NULL;
     pliant_status status = pliant_model_open(options->model, &model, err);
     if (status < 0) return status;
@@ -98,6 +149,10 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
         status = pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: --level %d: expected 0 to %d",
                                   options->model, level, info.level_count - 1);
         goto done;
+    }
+    if (options->detail) {
+        status = pliant_skin_create(model, level, &skin, err);
+        if (status < 0) goto done;
     }
     pliant_panel panels[PLIANT_RECORDING_LIMIT + 1];
     int32_t panel_count = 0;
@@ -123,6 +178,8 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
     }
     for (int32_t v = 0; v < shape.vertex_count; v++) held[v] = pliant_model_is_free(model, v) == 0;
     shape.held = held;
+    if (skin) status = dress(skin, &shape, panels, panel_count, &dressed, err);
+    if (status < 0) goto done;
     status = pliant_picture_draw(&picture, &shape, panels, panel_count, rgb, err);
     if (status < 0) goto done;
     status = pliant_png_file_write(options->output, picture.width, picture.height, rgb, err);
@@ -130,6 +187,8 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
 done:
     free(rgb);
     free(held);
+    free(dressed);
+    pliant_skin_destroy(skin);
     pliant_recording_destroy(recording);
     pliant_model_close(model);
     return status;

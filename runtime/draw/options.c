@@ -39,6 +39,8 @@ const char *pliant_draw_options_help(void)
            "      --range MAX       displacement at the end of the colour scale; default by the "
            "largest\n"
            "      --level L         draw level L of the mesh, 0 the coarsest; default the finest\n"
+           "      --detail          draw the detailed surface over that level (of a model made "
+           "with --detail)\n"
            "  -h, --help            this text\n"
            "      --version         the version\n"
            "\n"
@@ -145,7 +147,7 @@ static pliant_status read_show(const char *text, pliant_draw_options *options, p
     return refuse(err, "--show", "both, deformed or rest", text);
 }
 
-enum { STEP = 256, STEPS, SHEET, SHOW, VIEW, SIZE, MAGNIFY, RANGE, LEVEL, VERSION };
+enum { STEP = 256, STEPS, SHEET, SHOW, VIEW, SIZE, MAGNIFY, RANGE, LEVEL, DETAIL, VERSION };
 
 static pliant_status read_option(int option, const char *text, pliant_draw_options *options,
                                  pliant_error *err)
@@ -187,6 +189,9 @@ static pliant_status read_option(int option, const char *text, pliant_draw_optio
             return refuse(err, "--level", "a level from 0", text);
         options->level = (int32_t)count;
         return PLIANT_OK;
+    case DETAIL:
+        options->detail = 1;
+        return PLIANT_OK;
     case 'h':
         options->help = 1;
         return PLIANT_OK;
@@ -210,6 +215,7 @@ pliant_status pliant_draw_options_parse(int argc, char **argv, pliant_draw_optio
         {"magnify", required_argument, NULL, MAGNIFY},
         {"range", required_argument, NULL, RANGE},
         {"level", required_argument, NULL, LEVEL},
+        {"detail", no_argument, NULL, DETAIL},
         {"help", no_argument, NULL, 'h'},
         {"version", no_argument, NULL, VERSION},
         {NULL, 0, NULL, 0},

@@ -18,6 +18,7 @@ typedef struct pliant_draw_options {
     int32_t sheet_columns, sheet_rows;      // 0: no contact sheet; as many rows as needed
     int64_t steps[PLIANT_RECORDING_LIMIT];  // as given by --step or --steps
     int32_t step_count;                     // 0: the script's end, or evenly spaced for a sheet
+    int32_t detail;                         // 1: the detailed surface over that level
     int32_t help, version;                  // 1: asked for; nothing else is checked
 } pliant_draw_options;
 

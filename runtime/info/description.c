@@ -6,6 +6,7 @@
 #include "pliant/wavelet.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
 pliant_mesh_facts pliant_description_mesh(const pliant_model_view *view)
@@ -28,6 +29,27 @@ pliant_mesh_facts pliant_description_mesh(const pliant_model_view *view)
         facts.source_count += view->source_index[v] >= 0;
     }
     return facts;
+}
+
+pliant_detail_facts pliant_description_detail(const pliant_model_view *view)
+{
+    double sum = 0, tangential_sum = 0, largest = 0, tangential_largest = 0;
+    for (int32_t v = 0; v < view->detail_vertex_count; v++) {
+        const float *o = view->detail_offset + 3 * (size_t)v;
+        const double x = (double)o[0], y = (double)o[1], z = (double)o[2];
+        const double tangential = x * x + y * y, square = tangential + z * z;
+        sum += square;
+        tangential_sum += tangential;
+        if (square > largest) largest = square;
+        if (tangential > tangential_largest) tangential_largest = tangential;
+    }
+    const double count = view->detail_vertex_count > 0 ? view->detail_vertex_count : 1;
+    return (pliant_detail_facts){
+        .rms = sqrt(sum / count),
+        .largest = sqrt(largest),
+        .tangential_rms = sqrt(tangential_sum / count),
+        .tangential_largest = sqrt(tangential_largest),
+    };
 }
 
 int32_t pliant_description_level_faces(const pliant_model_view *view, int32_t level)
@@ -82,6 +104,18 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
     fprintf(stream, "material    Young's modulus %g, Poisson's ratio %g, density %g\n",
             v->material[0], v->material[1], v->material[2]);
     fprintf(stream, "domains     %d free, %d fixed\n", (int)v->free_count, (int)v->fixed_count);
+}
+
+static void print_detail(const pliant_model_view *v, FILE *stream)
+{
+    if (v->detail_steps == 0) return;
+    const pliant_detail_facts facts = pliant_description_detail(v);
+    fprintf(stream, "detail      %d vertices, %lld faces, %d step%s finer than level %d\n",
+            (int)v->detail_vertex_count, (long long)v->face_count << 2 * v->detail_steps,
+            (int)v->detail_steps, v->detail_steps == 1 ? "" : "s", (int)v->level_count - 1);
+    fprintf(stream,
+            "            offsets %.3g (RMS), %.3g (largest); tangential part %.3g, %.3g\n",
+            facts.rms, facts.largest, facts.tangential_rms, facts.tangential_largest);
 }
 
 static void print_level(const pliant_model_view *v, pliant_block_name block, int32_t level, FILE *stream)
@@ -185,6 +219,7 @@ void pliant_description_print(const pliant_contents *contents, FILE *stream)
     fprintf(stream, "%s\n", size);
     if (contents->kind == PLIANT_CONTENTS_MODEL) {
         print_mesh(&contents->model, stream);
+        print_detail(&contents->model, stream);
         print_greens(&contents->model, stream);
     } else if (contents->kind == PLIANT_CONTENTS_DENSE) {
         print_dense(&contents->dense, stream);

@@ -23,6 +23,12 @@ typedef struct pliant_mesh_facts {
 } pliant_mesh_facts;
 pliant_mesh_facts pliant_description_mesh(const pliant_model_view *view);
 
+// How large the detail's offsets are: root mean square and largest; tangential parts likewise.
+typedef struct pliant_detail_facts {
+    double rms, largest, tangential_rms, tangential_largest;
+} pliant_detail_facts;
+pliant_detail_facts pliant_description_detail(const pliant_model_view *view);
+
 // Faces of a level, were they counted: a quarter of the next finer's.
 int32_t pliant_description_level_faces(const pliant_model_view *view, int32_t level);
 // Bytes of a level's sections.

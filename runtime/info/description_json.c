@@ -66,6 +66,27 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
             (int)v->fixed_count);
 }
 
+static void print_detail(const pliant_model_view *v, FILE *stream)
+{
+    if (v->detail_steps == 0) return;
+    const pliant_detail_facts facts = pliant_description_detail(v);
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"rms", facts.rms},
+                   {"largest", facts.largest},
+                   {"tangential_rms", facts.tangential_rms},
+                   {"tangential_largest", facts.tangential_largest}};
+    fprintf(stream, ",\n  \"detail\": {\"steps\": %d, \"vertices\": %d, \"faces\": %lld",
+            (int)v->detail_steps, (int)v->detail_vertex_count,
+            (long long)v->face_count << 2 * v->detail_steps);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        fprintf(stream, ", \"%s\": ", numbers[i].name);
+        print_number(numbers[i].value, stream);
+    }
+    fputs("}", stream);
+}
+
 static void print_level(const pliant_model_view *v, pliant_block_name block, int32_t level,
                         const pliant_definiteness *verified, FILE *stream)
 {
@@ -178,6 +199,7 @@ void pliant_description_print_json(const pliant_contents *contents, const pliant
     if (verified) fputs(", \"verified\": true", stream);
     if (contents->kind == PLIANT_CONTENTS_MODEL) {
         print_mesh(&contents->model, stream);
+        print_detail(&contents->model, stream);
         print_greens(&contents->model, verified, stream);
     } else if (contents->kind == PLIANT_CONTENTS_DENSE) {
         fprintf(stream, ",\n  \"domains\": {\"free\": %d, \"fixed\": %d}",

@@ -30,7 +30,9 @@ static int run(const pliant_info_options *options)
         status = EXIT_FAILED;
     if (status == EXIT_DONE && options->output) {
         const pliant_status done =
-            pliant_mesh_export(&contents, options->output, options->level, &err);
+            options->detail
+                ? pliant_mesh_export_detail(&contents, options->output, &err)
+                : pliant_mesh_export(&contents, options->output, options->level, &err);
         if (done < 0) status = done == PLIANT_ERR_ARGUMENT ? EXIT_MISUSED : EXIT_FAILED;
     }
     if (status != EXIT_DONE) refuse(status, &err);

@@ -2,6 +2,7 @@
 #include "mesh_export.h"
 
 #include "pliant/error.h"
+#include "pliant/pliant.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -21,20 +22,21 @@ pliant_mesh_format pliant_mesh_export_format(const char *path)
     return PLIANT_MESH_UNKNOWN;
 }
 
-// One level: the vertices are a prefix of the finest level's.
+// One level, whose vertices are a prefix of the finest level's, or the detail.
 typedef struct level_mesh {
     int32_t vertex_count, face_count;
+    int digits;  // that bring every coordinate back as it was: 17 of a double, 9 of a float
     const double *vertices;
     const int32_t *faces;
 } level_mesh;
 
-// 17 digits bring every double back as it was.
 static void write_obj(const level_mesh *mesh, FILE *file)
 {
     fputs("# Written by pliant-info; vertices in the model's order, coarse to fine.\n", file);
     for (int32_t v = 0; v < mesh->vertex_count; v++) {
         const double *x = mesh->vertices + 3 * (size_t)v;
-        fprintf(file, "v %.17g %.17g %.17g\n", x[0], x[1], x[2]);
+        fprintf(file, "v %.*g %.*g %.*g\n", mesh->digits, x[0], mesh->digits, x[1], mesh->digits,
+                x[2]);
     }
     for (int32_t f = 0; f < mesh->face_count; f++) {
         const int32_t *v = mesh->faces + 3 * (size_t)f;
@@ -80,39 +82,93 @@ static pliant_status write_file(const level_mesh *mesh, const char *path, const 
     return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: %s", path, strerror(error ? error : EIO));
 }
 
+// Write under a temporary name, and move it to its place.
+static pliant_status place_file(const level_mesh *mesh, const char *path, pliant_error *err)
+{
+    char *temporary = malloc(strlen(path) + sizeof ".tmp");
+    if (!temporary)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%.400s: expected memory, found none",
+                                path);
+    strcpy(temporary, path);
+    strcat(temporary, ".tmp");
+    const pliant_status status = write_file(mesh, path, temporary, err);
+    free(temporary);
+    return status;
+}
+
+static pliant_status check_kind(const pliant_contents *contents, pliant_error *err)
+{
+    if (contents->kind == PLIANT_CONTENTS_MODEL) return PLIANT_OK;
+    return pliant_error_set(
+        err, PLIANT_ERR_MISSING, "%.400s: expected a model to export, found a %s file",
+        pliant_reader_name(contents->reader), pliant_contents_kind_text(contents->kind));
+}
+
 pliant_status pliant_mesh_export(const pliant_contents *contents, const char *path, int32_t level,
                                  pliant_error *err)
 {
     const pliant_model_view *v = &contents->model;
-    const char *name = pliant_reader_name(contents->reader);
-    if (contents->kind != PLIANT_CONTENTS_MODEL)
-        return pliant_error_set(err, PLIANT_ERR_MISSING,
-                                "%.400s: expected a model to export, found a %s file", name,
-                                pliant_contents_kind_text(contents->kind));
+    pliant_status status = check_kind(contents, err);
+    if (status < 0) return status;
     if (level < 0) level = v->level_count - 1;
     if (level >= v->level_count)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "%.400s: --level: expected 0 to %d, found %d", name,
-                                (int)v->level_count - 1, (int)level);
+        return pliant_error_set(
+            err, PLIANT_ERR_ARGUMENT, "%.400s: --level: expected 0 to %d, found %d",
+            pliant_reader_name(contents->reader), (int)v->level_count - 1, (int)level);
     pliant_hierarchy *hierarchy = NULL;
-    pliant_status status = pliant_contents_hierarchy(contents, &hierarchy, err);
+    status = pliant_contents_hierarchy(contents, &hierarchy, err);
     if (status < 0) return status;
-    char *temporary = malloc(strlen(path) + sizeof ".tmp");
-    if (temporary) {
-        const level_mesh mesh = {
-            .vertex_count = hierarchy->vertex_count[level],
-            .face_count = hierarchy->face_count[level],
-            .vertices = v->vertices,
-            .faces = hierarchy->faces[level],
-        };
-        strcpy(temporary, path);
-        strcat(temporary, ".tmp");
-        status = write_file(&mesh, path, temporary, err);
-    } else {
-        status =
-            pliant_error_set(err, PLIANT_ERR_MEMORY, "%.400s: expected memory, found none", path);
-    }
-    free(temporary);
+    const level_mesh mesh = {
+        .vertex_count = hierarchy->vertex_count[level],
+        .face_count = hierarchy->face_count[level],
+        .digits = 17,
+        .vertices = v->vertices,
+        .faces = hierarchy->faces[level],
+    };
+    status = place_file(&mesh, path, err);
     pliant_hierarchy_destroy(hierarchy);
+    return status;
+}
+
+pliant_status pliant_mesh_export_detail(const pliant_contents *contents, const char *path,
+                                        pliant_error *err)
+{
+    pliant_model *model = NULL;
+    pliant_detail *detail = NULL;
+    pliant_vec3 *positions = NULL;
+    double *vertices = NULL;
+    pliant_status status = check_kind(contents, err);
+    if (status < 0) return status;
+    status = pliant_model_open(pliant_reader_name(contents->reader), &model, err);
+    if (status < 0) return status;
+    status = pliant_detail_create(model, contents->model.level_count - 1, &detail, err);
+    if (status < 0) goto done;
+    const pliant_detail_info info = pliant_detail_describe(detail);
+    positions = malloc((size_t)info.vertex_count * sizeof *positions);
+    vertices = malloc(3 * (size_t)info.vertex_count * sizeof *vertices);
+    if (!positions || !vertices) {
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "%.400s: no memory for %d vertices", path,
+                                  (int)info.vertex_count);
+        goto done;
+    }
+    status = pliant_detail_evaluate(detail, NULL, positions, NULL);
+    for (int32_t i = 0; i < info.vertex_count; i++) {
+        vertices[3 * (size_t)i] = (double)positions[i].x;
+        vertices[3 * (size_t)i + 1] = (double)positions[i].y;
+        vertices[3 * (size_t)i + 2] = (double)positions[i].z;
+    }
+    const level_mesh mesh = {
+        .vertex_count = info.vertex_count,
+        .face_count = info.face_count,
+        .digits = 9,
+        .vertices = vertices,
+        .faces = pliant_detail_faces(detail),
+    };
+    if (status >= 0) status = place_file(&mesh, path, err);
+done:
+    free(vertices);
+    free(positions);
+    pliant_detail_destroy(detail);
+    pliant_model_close(model);
     return status;
 }

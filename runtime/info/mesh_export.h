@@ -1,4 +1,4 @@
-// mesh_export.h: write a model's mesh, of any of its levels, for other programs.
+// mesh_export.h: write a model's mesh, of any of its levels or detailed, for other programs.
 #pragma once
 
 #include "contents.h"
@@ -17,3 +17,6 @@ pliant_mesh_format pliant_mesh_export_format(const char *path);
 PLIANT_UNUSED_RESULT pliant_status pliant_mesh_export(const pliant_contents *contents,
                                                       const char *path, int32_t level,
                                                       pliant_error *err);
+// The detailed shape at rest, likewise. PLIANT_ERR_MISSING: the file has none.
+PLIANT_UNUSED_RESULT pliant_status pliant_mesh_export_detail(const pliant_contents *contents,
+                                                             const char *path, pliant_error *err);

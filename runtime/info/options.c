@@ -25,6 +25,7 @@ const char *pliant_info_options_help(void)
            "  --export FILE       write the model's mesh; FILE ends in .obj or .ply\n"
            "  --level L           with --export: the mesh of level L, 0 the coarsest (default: "
            "finest)\n"
+           "  --detail            with --export: the detailed shape at rest instead of a level\n"
            "  --json              the same as JSON\n"
            "  -h, --help          this text\n"
            "  --version           the program's version\n"
@@ -32,7 +33,7 @@ const char *pliant_info_options_help(void)
            "Exit status: 0 done, 1 failed (one line on standard error says why), 2 misused.\n";
 }
 
-enum { OPTION_VERSION = 256, OPTION_VERIFY, OPTION_EXPORT, OPTION_LEVEL, OPTION_JSON };
+enum { OPTION_VERSION = 256, OPTION_VERIFY, OPTION_EXPORT, OPTION_LEVEL, OPTION_DETAIL, OPTION_JSON };
 
 static const struct option known[] = {
     {"help", no_argument, NULL, 'h'},
@@ -40,6 +41,7 @@ static const struct option known[] = {
     {"verify", no_argument, NULL, OPTION_VERIFY},
     {"export", required_argument, NULL, OPTION_EXPORT},
     {"level", required_argument, NULL, OPTION_LEVEL},
+    {"detail", no_argument, NULL, OPTION_DETAIL},
     {"json", no_argument, NULL, OPTION_JSON},
     {NULL, 0, NULL, 0},
 };
@@ -68,6 +70,9 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
         case OPTION_LEVEL:
             status = pliant_option_integer("--level", optarg, 0, PLIANT_LEVEL_LIMIT, &o.level, err);
             break;
+        case OPTION_DETAIL:
+            o.detail = 1;
+            break;
         case OPTION_JSON:
             o.json = 1;
             break;
@@ -87,6 +92,12 @@ pliant_status pliant_info_options_parse(int argc, char **argv, pliant_info_optio
     if (o.level >= 0 && !o.output)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "--level: expected --export with it, found none");
+    if (o.detail && !o.output)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--detail: expected --export with it, found none");
+    if (o.detail && o.level >= 0)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--detail and --level name two meshes: expected one");
     if (o.output && pliant_mesh_export_format(o.output) == PLIANT_MESH_UNKNOWN)
         return pliant_error_set(
             err, PLIANT_ERR_ARGUMENT,

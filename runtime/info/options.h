@@ -7,6 +7,7 @@ typedef struct pliant_info_options {
     const char *path;       // the file to look at; borrowed from argv, as the next
     const char *output;     // --export; NULL: none
     int32_t level;          // --level; -1: the finest
+    int32_t detail;         // 1: --export writes the detailed shape
     int32_t verify, json;   // 1: asked for
     int32_t help, version;  // 1: asked for; nothing else is checked
 } pliant_info_options;

@@ -15,10 +15,10 @@ pliant_status pliant_frames_open(const char *path, int32_t vertex_count, pliant_
                             path);
 }
 
-pliant_status pliant_frames_add(pliant_frames *frames, const pliant_player *player,
+pliant_status pliant_frames_add(pliant_frames *frames, const pliant_vec3 *displacement,
                                 const pliant_step *step, pliant_error *err)
 {
-    (void)frames, (void)player, (void)step;
+    (void)frames, (void)displacement, (void)step;
     return pliant_error_set(err, PLIANT_ERR_MISSING, "built without HDF5");
 }
 
@@ -115,13 +115,12 @@ pliant_status pliant_frames_open(const char *path, int32_t vertex_count, pliant_
     return PLIANT_OK;
 }
 
-pliant_status pliant_frames_add(pliant_frames *frames, const pliant_player *player,
+pliant_status pliant_frames_add(pliant_frames *frames, const pliant_vec3 *displacement,
                                 const pliant_step *step, pliant_error *err)
 {
     const step_head head = {(uint64_t)step->number, step->time, (double)step->total_ns * 1e-3};
     memcpy(frames->record, &head, sizeof head);
-    memcpy(frames->record + sizeof head, pliant_player_surface(player),
-           frames->record_size - sizeof head);
+    memcpy(frames->record + sizeof head, displacement, frames->record_size - sizeof head);
     for (size_t done = 0; done < frames->record_size;) {
         const ssize_t written =
             write(frames->spool, frames->record + done, frames->record_size - done);

@@ -18,8 +18,9 @@ typedef struct pliant_frames pliant_frames;
 
 PLIANT_UNUSED_RESULT pliant_status pliant_frames_open(const char *path, int32_t vertex_count,
                                                       pliant_frames **frames, pliant_error *err);
+// displacement[vertex_count], m.
 PLIANT_UNUSED_RESULT pliant_status pliant_frames_add(pliant_frames *frames,
-                                                     const pliant_player *player,
+                                                     const pliant_vec3 *displacement,
                                                      const pliant_step *step, pliant_error *err);
 // Ends the frames' life whatever it returns.
 PLIANT_UNUSED_RESULT pliant_status pliant_frames_commit(pliant_frames *frames, pliant_error *err);

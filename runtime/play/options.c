@@ -18,6 +18,7 @@ enum long_only {
     OPTION_LOD,
     OPTION_DEADLINE,
     OPTION_PASSIVE,
+    OPTION_DETAIL,
     OPTION_REPEAT,
     OPTION_THREADS,
     OPTION_COMPARE,
@@ -34,6 +35,7 @@ static const struct option long_options[] = {
     {"lod", required_argument, NULL, OPTION_LOD},
     {"deadline-us", required_argument, NULL, OPTION_DEADLINE},
     {"passive", no_argument, NULL, OPTION_PASSIVE},
+    {"detail", no_argument, NULL, OPTION_DETAIL},
     {"repeat", required_argument, NULL, OPTION_REPEAT},
     {"threads", required_argument, NULL, OPTION_THREADS},
     {"compare", required_argument, NULL, OPTION_COMPARE},
@@ -82,6 +84,9 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
                                      err);
     case OPTION_PASSIVE:
         o->passive = 1;
+        return PLIANT_OK;
+    case OPTION_DETAIL:
+        o->detail = 1;
         return PLIANT_OK;
     case OPTION_REPEAT:
         return pliant_option_integer("--repeat", optarg, 1, repeat_limit, &o->repeat, err);
@@ -174,6 +179,9 @@ pliant_status pliant_play_options_parse(int argc, char **argv, pliant_play_optio
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "expected MODEL.h5 [SCRIPT], found '%.60s' too; see --help",
                                 argv[optind]);
+    if (o.detail && !o.frames && !o.vtk)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--detail: expected --frames or --vtk with it, found neither");
     pliant_status status = check_script(&o, err);
     if (status >= 0) status = check_files(&o, err);
     if (status >= 0) *options = o;

@@ -10,7 +10,7 @@ typedef struct pliant_play_options {
     int32_t level;                             // of --lod, -1: all
     int32_t repeat, threads;
     int32_t deadline_us;  // -1: none
-    int force, quiet, json, verify, passive;
+    int force, quiet, json, verify, passive, detail;
 } pliant_play_options;  // strings are argv's
 
 typedef enum pliant_play_request {

@@ -4,6 +4,7 @@
 #include "csv.h"
 #include "frames.h"
 #include "report.h"
+#include "skin.h"
 
 #include "pliant/error.h"
 #include "pliant/vtk_series.h"
@@ -25,6 +26,7 @@ struct pliant_outputs {
     pliant_csv *csv;  // these are NULL when not asked for
     pliant_frames *frames;
     pliant_vtk_series *vtk;
+    pliant_skin *skin;
     pliant_compare *compare;
     pliant_compare_summary compared;
     // Where tractions are known, for vtk: all vertices with supports, else the free ones.
@@ -32,6 +34,7 @@ struct pliant_outputs {
     int32_t traction_count;
     pliant_vec3 *known;     // [traction_count]
     pliant_vec3 *traction;  // [surface vertices]
+    pliant_vec3 *carried;   // [skin's vertices]: tractions on the detail; NULL without
 };
 
 // ---- Life ----
@@ -42,13 +45,14 @@ static pliant_status open_vtk(pliant_outputs *o, pliant_error *err)
     o->traction_vertex = malloc(((size_t)count + 1) * sizeof *o->traction_vertex);
     o->known = calloc((size_t)count + 1, sizeof *o->known);
     o->traction = calloc((size_t)count + 1, sizeof *o->traction);
-    if (!o->traction_vertex || !o->known || !o->traction)
+    if (o->skin) o->carried = malloc((size_t)o->skin->vertex_count * sizeof *o->carried);
+    if (!o->traction_vertex || !o->known || !o->traction || (o->skin && !o->carried))
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory", o->options->vtk);
     const int has_supports = pliant_model_describe(o->model).has_supports;
     for (int32_t v = 0; v < count; v++)
         if (has_supports || pliant_model_is_free(o->model, v) == 1)
             o->traction_vertex[o->traction_count++] = v;
-    const pliant_vtk_series_def def = {
+    pliant_vtk_series_def def = {
         .folder = o->options->vtk,
         .overwrite = o->options->force ? PLIANT_VTK_FOREIGN : PLIANT_VTK_OWN,
         .vertex_count = count,
@@ -56,6 +60,12 @@ static pliant_status open_vtk(pliant_outputs *o, pliant_error *err)
         .positions = pliant_model_positions(o->model),
         .faces = pliant_model_faces(o->model, o->level),
     };
+    if (o->skin) {
+        def.vertex_count = o->skin->vertex_count;
+        def.face_count = o->skin->face_count;
+        def.positions = o->skin->rest;
+        def.faces = o->skin->faces;
+    }
     return pliant_vtk_series_create(&def, &o->vtk, err);
 }
 
@@ -72,9 +82,12 @@ pliant_status pliant_outputs_open(const pliant_play_options *options, const plia
     pliant_status status = PLIANT_OK;
     // The comparison only reads: first, so that a wrong dense file leaves no trace.
     if (options->compare) status = pliant_compare_open(options->compare, model, &o->compare, err);
+    if (status >= 0 && options->detail) status = pliant_skin_create(model, level, &o->skin, err);
     if (status >= 0 && options->csv) status = pliant_csv_open(options->csv, &o->csv, err);
     if (status >= 0 && options->frames)
-        status = pliant_frames_open(options->frames, pliant_model_level_vertex_count(model, level),
+        status = pliant_frames_open(options->frames,
+                                    o->skin ? o->skin->vertex_count
+                                            : pliant_model_level_vertex_count(model, level),
                                     &o->frames, err);
     if (status >= 0 && options->vtk) status = open_vtk(o, err);
     if (status < 0) {
@@ -92,6 +105,8 @@ void pliant_outputs_destroy(pliant_outputs *outputs)
     pliant_frames_abandon(outputs->frames);
     pliant_csv_abandon(outputs->csv);
     pliant_compare_close(outputs->compare);
+    pliant_skin_destroy(outputs->skin);
+    free(outputs->carried);
     free(outputs->traction);
     free(outputs->known);
     free(outputs->traction_vertex);
@@ -144,8 +159,12 @@ static pliant_status add_vtk(pliant_outputs *o, pliant_player *player, const pli
                                 (long long)step->number, pliant_status_name(status));
     for (int32_t i = 0; i < o->traction_count; i++)
         o->traction[o->traction_vertex[i]] = o->known[i];
-    return pliant_vtk_series_add(o->vtk, step->time, pliant_player_surface(player), o->traction,
-                                 err);
+    if (!o->skin)
+        return pliant_vtk_series_add(o->vtk, step->time, pliant_player_surface(player), o->traction,
+                                     NULL, err);
+    (void)!pliant_detail_interpolate(o->skin->detail, 3, &o->traction->x, &o->carried->x);
+    return pliant_vtk_series_add(o->vtk, step->time, o->skin->displacement, o->carried,
+                                 o->skin->normals, err);
 }
 
 static pliant_status stepped(void *context, pliant_player *player, const pliant_step *step,
@@ -154,7 +173,10 @@ static pliant_status stepped(void *context, pliant_player *player, const pliant_
     pliant_outputs *o = context;
     pliant_status status = PLIANT_OK;
     if (o->csv) status = pliant_csv_add(o->csv, player, step, err);
-    if (status >= 0 && o->frames) status = pliant_frames_add(o->frames, player, step, err);
+    const pliant_vec3 *surface = pliant_player_surface(player);
+    if (o->skin) pliant_skin_move(o->skin, surface);
+    if (status >= 0 && o->frames)
+        status = pliant_frames_add(o->frames, o->skin ? o->skin->displacement : surface, step, err);
     if (status >= 0 && o->vtk) status = add_vtk(o, player, step, err);
     if (status >= 0 && o->compare) status = pliant_compare_add(o->compare, player, err);
     if (status < 0 || !o->is_streaming) return status;

@@ -2,6 +2,7 @@
 #include "tiny_write.h"
 
 #include "image.h"
+#include "pliant/pliant.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -315,6 +316,53 @@ static void levels_are_exported_as_obj_and_ply(void **state)
     assert_false(exists(scratch("out.OBJ.tmp")));
 }
 
+// The exported shape is the library's, float for float.
+static void detail_is_described_and_exported(void **state)
+{
+    (void)state;
+    const char *path = write_model("detail.h5", 3, TINY_DETAIL), *output = scratch("detail.obj");
+    char arguments[1500];
+    check_answer(ask_about("", path), 0, "detail      258 vertices, 512 faces, 1 step finer than level 2\n");
+    check_answer(ask_about("--json", path), 0, "\"detail\": {\"steps\": 1, \"vertices\": 258, \"faces\": 512, \"rms\": ");
+    check_json(ask_about("--json", path)->text);
+    check_answer(ask_about("--verify", path), 0, "verified: ");
+    snprintf(arguments, sizeof arguments, "--export '%s' --detail '%s'", output, path);
+    check_answer(ask(arguments), 0, "");
+
+    pliant_error err;
+    pliant_model *model;
+    pliant_detail *detail;
+    pliant_vec3 positions[258];
+    check_ok(pliant_model_open(path, &model, &err), &err);
+    check_ok(pliant_detail_create(model, 2, &detail, &err), &err);
+    assert_int_equal(pliant_detail_evaluate(detail, NULL, positions, NULL), PLIANT_OK);
+    FILE *file = fopen(output, "r");
+    assert_non_null(file);
+    char line[200];
+    int32_t vertex = 0, face = 0;
+    while (fgets(line, sizeof line, file)) {
+        pliant_vec3 x;
+        int v[3];
+        if (sscanf(line, "v %f %f %f", &x.x, &x.y, &x.z) == 3) {
+            assert_memory_equal(&x, &positions[vertex], sizeof x);
+            vertex++;
+        } else if (sscanf(line, "f %d %d %d", &v[0], &v[1], &v[2]) == 3) {
+            for (int k = 0; k < 3; k++) assert_int_equal(v[k], pliant_detail_faces(detail)[3 * face + k] + 1);
+            face++;
+        }
+    }
+    fclose(file);
+    assert_int_equal(vertex, 258);
+    assert_int_equal(face, 512);
+    pliant_detail_destroy(detail);
+    pliant_model_close(model);
+
+    path = write_model("plain.h5", 2, 0);
+    snprintf(arguments, sizeof arguments, "--export '%s' --detail '%s'", scratch("none.obj"), path);
+    check_answer(ask(arguments), 1, "plain.h5: /detail: expected geometric detail");
+    assert_false(exists(scratch("none.obj")));
+}
+
 static void exports_that_cannot_be_written_leave_nothing(void **state)
 {
     (void)state;
@@ -354,6 +402,8 @@ static void misuse_exits_with_2_and_failure_with_1(void **state)
     check_answer(ask("--level 1 a"), 2, "pliant-info: --level: expected --export with it, found none");
     check_answer(ask("--export a.obj --level x a"), 2, "pliant-info: --level: expected a whole number from 0 to 15, found 'x'");
     check_answer(ask("--export a.obj --level -1 a"), 2, "pliant-info: --level: expected a whole number from 0 to 15, found '-1'");
+    check_answer(ask("--detail a"), 2, "pliant-info: --detail: expected --export with it, found none");
+    check_answer(ask("--detail --export a.obj --level 1 a"), 2, "pliant-info: --detail and --level name two meshes: expected one");
     check_answer(ask("--json=3 a"), 2, "pliant-info: --json: expected no value, found --json=3");
     check_answer(ask("-- --json"), 1, "pliant-info: --json: No such file or directory");
     check_answer(ask("/tmp"), 1, "pliant-info: /tmp: expected a file, found a directory");
@@ -383,6 +433,7 @@ int main(void)
         cmocka_unit_test(damage_is_found_by_verify_alone),
         cmocka_unit_test(wrong_topology_is_found_by_verify),
         cmocka_unit_test(levels_are_exported_as_obj_and_ply),
+        cmocka_unit_test(detail_is_described_and_exported),
         cmocka_unit_test(exports_that_cannot_be_written_leave_nothing),
         cmocka_unit_test(misuse_exits_with_2_and_failure_with_1),
         cmocka_unit_test(lost_output_is_noticed),

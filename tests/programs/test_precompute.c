@@ -158,6 +158,8 @@ static void help_version_and_misuse_have_their_exit_status(void **state)
         {"--eps banana a.obj", "--eps: expected a number, found 'banana'"},
         {"--subdivide 1.5 a.obj", "--subdivide: expected a whole number"},
         {"--scheme lop a.obj", "--scheme: expected loop, butterfly or midpoint, found 'lop'"},
+        {"--detail 0 a.obj", "--detail: expected a whole number from 1 to 15, found '0'"},
+        {"--detail 3 --subdivide 2 --fixed 'z<0' a.obj -o b.h5", "--detail: expected at most the 2 levels of --subdivide, found 3"},
         {"--method fem a.obj", "--method: expected bem, found 'fem'"},
         {"--eps 0.1 --rms 0.1 --fixed 'z<0' a.obj -o b.h5", "one kind"},
         {"a.obj -o b.h5", "nothing holds the solid"},
@@ -212,6 +214,7 @@ static void refusals_name_what_and_why_and_leave_nothing(void **state)
         {"--fixed-list nowhere.txt scripts/sample/whale.obj --subdivide 1", "nowhere.txt"},
         {"--fixed 'z<0.03' scripts/sample/whale.obj", "whale.obj: no subdivision connectivity"},
         {"--fixed 'z<0.03' scripts/sample/whale.obj --subdivide 9", "GB"},
+        {"--fixed 'z<0.03' scripts/sample/whale.obj --subdivide 13 --detail 11", "--subdivide 13 --detail 11: makes"},
         {"--fixed 'z<0.03' scripts/sample/whale.obj --subdivide 14", "GB"},
     };
     for (size_t i = 0; i < sizeof refusals / sizeof *refusals; i++) {
@@ -576,6 +579,68 @@ static void source_numbers_follow_a_shuffled_mesh(void **state)
     close_model(&o);
 }
 
+// The v lines of an OBJ file, [*count][3]; the caller frees.
+static double *vertices_of(const char *path, int32_t *count)
+{
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    double *x = NULL, v[3];
+    char line[256];
+    for (*count = 0; fgets(line, sizeof line, file);) {
+        if (sscanf(line, "v %lf %lf %lf", &v[0], &v[1], &v[2]) != 3) continue;
+        x = realloc(x, 3 * ((size_t)*count + 1) * sizeof *x);
+        assert_non_null(x);
+        memcpy(x + 3 * (size_t)(*count)++, v, sizeof v);
+    }
+    fclose(file);
+    return x;
+}
+
+// Elasticity on fewer levels, the shape of all: exported, it is the mesh of a model of all levels.
+static void detail_keeps_the_shape_of_the_levels_it_takes_off(void **state)
+{
+    (void)state;
+    check_command c;
+    const char *whole = in_folder("whole.h5"), *fine = in_folder("fine.obj"), *shape = in_folder("shape.obj");
+    char model[2][512];
+    for (int k = 0; k < 2; k++) snprintf(model[k], sizeof model[k], "%s/detail%d.h5", check_folder(), k);
+    check_run(&c, "%s/pliant-precompute -q %s %s -o %s && %s/pliant-info --export %s %s", check_build(), small_run,
+              sample, whole, check_build(), fine, whole);
+    assert_int_equal(c.status, 0);
+    int32_t n = 0, count = 0;
+    double *x = vertices_of(fine, &n);
+    assert_int_equal(n, 162);
+    // Subdivided here, on three ranks; and found in the exported mesh, on one.
+    check_run(&c, "mpirun --quiet -n 3 %s/pliant-precompute --json %s --detail 1 %s -o %s", check_build(), small_run,
+              sample, model[0]);
+    assert_int_equal(c.status, 0);
+    assert_non_null(strstr(c.output, "\"vertices\": 42"));
+    assert_non_null(strstr(c.output, "\"detail\": {\"steps\": 1, \"vertices\": 162, \"rms\": "));
+    check_run(&c, "%s/pliant-precompute -q --fixed 'z<0.03' --young 50000 --poisson 0.4 --density 1000 --detail 1 %s -o %s",
+              check_build(), fine, model[1]);
+    assert_int_equal(c.status, 0);
+    for (int k = 0; k < 2; k++) {
+        opened o = open_model(model[k]);
+        assert_int_equal(o.view.vertex_count, 42);
+        assert_int_equal(o.view.level_count, 2);
+        assert_int_equal(o.view.detail_steps, 1);
+        for (int32_t i = 0; i < 3 * 42; i++) check_near(o.view.vertices[i], x[i], 0);
+        check_run(&c, "%s/pliant-info --detail --export %s %s", check_build(), shape, model[k]);
+        assert_int_equal(c.status, 0);
+        double *y = vertices_of(shape, &count);
+        assert_int_equal(count, n);
+        // Floats of a shape 0.3 long.
+        for (int32_t i = 0; i < 3 * n; i++) check_near(y[i], x[i], 1e-7);
+        for (int32_t v = 0; v < n; v++) assert_int_equal(o.view.detail_source_index[v], k == 1 ? v : v < 12 ? v : -1);
+        free(y);
+        close_model(&o);
+    }
+    free(x);
+    // More than there is.
+    check_run(&c, "%s/pliant-precompute -q --fixed 'z<0.03' --detail 3 %s -o %s", check_build(), fine, whole);
+    assert_int_equal(c.status, 1);
+}
+
 static void json_summary_is_one_object(void **state)
 {
     (void)state;
@@ -612,6 +677,7 @@ int main(void)
         cmocka_unit_test(stored_columns_meet_their_errors_against_the_dense_file),
         cmocka_unit_test(a_model_without_loss_plays_as_its_dense_file),
         cmocka_unit_test(source_numbers_follow_a_shuffled_mesh),
+        cmocka_unit_test(detail_keeps_the_shape_of_the_levels_it_takes_off),
         cmocka_unit_test(json_summary_is_one_object),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -824,6 +824,48 @@ static void coarse_levels_and_single_panels_are_drawn(void **state)
     drop_stage(&s);
 }
 
+// A sphere whose finer vertices have waves: its outline is no longer that of the control mesh, and
+// it is pressed where that is pressed.
+static void detailed_surfaces_are_drawn_over_any_level(void **state)
+{
+    (void)state;
+    const stage s = make_stage(press_and_release);
+    pliant_draw_options options = options_for(&s);
+    pliant_error err = {""};
+    options.detail = 1;
+    assert_int_equal(pliant_drawing_make(&options, &err), PLIANT_ERR_MISSING);
+    assert_non_null(strstr(err.text, "/detail: expected geometric detail"));
+    assert_int_not_equal(access(s.folder.file, F_OK), 0);
+
+    check_synthetic *body = check_synthetic_create(&(check_synthetic_def){
+        .levels = 2, .wavelet = pliant_wavelet_default(), .blocks = CHECK_FREE_BLOCK});
+    check_synthetic_roughen(body, 2);
+    check_synthetic_write(body, s.model);
+    check_synthetic_destroy(body);
+    int drawn[3], red[3];
+    for (int k = 0; k < 3; k++) {
+        options.detail = k > 0;
+        options.level = k == 2 ? 0 : 2;
+        options.steps[0] = 2;
+        options.step_count = 1;
+        check_ok(pliant_drawing_make(&options, &err), &err);
+        int32_t width, height;
+        uint8_t *rgb = read_png(s.folder.file, &width, &height);
+        drawn[k] = count_drawn(rgb, width, height, 0, 160);
+        red[k] = 0;
+        for (int32_t i = 0; i < width * (height - 50); i++)
+            if (i % width >= 160 && rgb[3 * i] - rgb[3 * i + 2] > 90) red[k]++;
+        free(rgb);
+    }
+    // The frame fits what is drawn, so that areas tell shapes apart, not sizes.
+    assert_int_not_equal(drawn[0], drawn[1]);
+    for (int k = 0; k < 3; k++) {
+        check_at_least(drawn[k], 8000);
+        check_at_least(red[k], 20);
+    }
+    drop_stage(&s);
+}
+
 static void contact_sheet_has_a_panel_for_each_step(void **state)
 {
     (void)state;
@@ -923,6 +965,7 @@ int main(void)
         cmocka_unit_test(recorded_states_are_those_of_their_steps),
         cmocka_unit_test(picture_of_a_step_has_the_rest_shape_beside_it),
         cmocka_unit_test(coarse_levels_and_single_panels_are_drawn),
+        cmocka_unit_test(detailed_surfaces_are_drawn_over_any_level),
         cmocka_unit_test(contact_sheet_has_a_panel_for_each_step),
         cmocka_unit_test(drawings_are_the_same_bytes_every_time),
         cmocka_unit_test(what_cannot_be_drawn_is_refused_and_leaves_no_file),

@@ -3,6 +3,7 @@
 // PLIANT_BUILD names the folder of the program; default build.
 #include "check.h"
 
+#include "pliant/pliant.h"
 #include "pliant/reader.h"
 #include "synthetic_model.h"
 
@@ -132,6 +133,12 @@ static int set_up(void **state)
     check_write_synthetic_levels(in_folder("tiny.h5"), NULL, 1, 0, wavelet, CHECK_FREE_BLOCK);
     // Compressed beyond what contact bears.
     check_write_synthetic_levels(in_folder("rough.h5"), NULL, 2, 1, wavelet, CHECK_FREE_BLOCK);
+    // The first again, with 2562 vertices of detail.
+    check_synthetic *detailed = check_synthetic_create(&(check_synthetic_def){
+        .levels = 2, .wavelet = wavelet, .blocks = CHECK_FREE_BLOCK});
+    check_synthetic_roughen(detailed, 2);
+    check_synthetic_write(detailed, in_folder("detail.h5"));
+    check_synthetic_destroy(detailed);
     write_text("poke.script", poke);
     return 0;
 }
@@ -154,7 +161,7 @@ static void help_and_version_go_to_standard_output(void **state)
     check_run(0, "$P -h");
     const char *const options[] = {"-o, --output", "--frames",    "--vtk",       "--force",
                                    "--lod",        "--repeat",    "--threads",   "--compare",
-                                   "--deadline-us", "--passive",
+                                   "--deadline-us", "--passive",     "--detail",
                                    "--json",       "--no-verify", "-q, --quiet", "--help",
                                    "--version",    "example:"};
     for (size_t i = 0; i < sizeof options / sizeof *options; i++) check_contains(out, options[i]);
@@ -211,6 +218,8 @@ static void misuse_is_told_and_ends_with_status_2(void **state)
         {"--frames ./poke.script model.h5 poke.script",
          "--frames: expected a file of its own, found the input poke.script"},
         {"-o x --frames x model.h5", "-o and --frames: expected two files, found x twice"},
+        {"--detail -o x model.h5 poke.script",
+         "--detail: expected --frames or --vtk with it, found neither"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char expected[256];
@@ -703,6 +712,60 @@ static void vtk_series_opens(void **state)
     check_run(0, "rm -r series");
 }
 
+// What a program that knows the library makes of the same surface.
+static void detailed_surfaces_are_those_of_the_library(void **state)
+{
+    (void)state;
+    for (int lod = 1; lod <= 2; lod++) {
+        check_run(0,
+                  "$P -q --lod %d --frames coarse.h5 detail.h5 poke.script && $P -q --lod %d "
+                  "--detail --frames fine.h5 --vtk skin detail.h5 poke.script",
+                  lod, lod);
+        pliant_error reason;
+        pliant_reader *coarse, *fine;
+        pliant_model *model;
+        pliant_detail *detail;
+        check_ok(pliant_reader_open(in_folder("coarse.h5"), &coarse, &reason), &reason);
+        check_ok(pliant_reader_open(in_folder("fine.h5"), &fine, &reason), &reason);
+        check_ok(pliant_model_open(in_folder("detail.h5"), &model, &reason), &reason);
+        check_ok(pliant_detail_create(model, lod, &detail, &reason), &reason);
+        const size_t n = (size_t)pliant_detail_describe(detail).vertex_count;
+        const size_t controls = (size_t)pliant_detail_describe(detail).control_count;
+        const pliant_section *u = pliant_reader_find(coarse, "/displacement");
+        const pliant_section *v = pliant_reader_find(fine, "/displacement");
+        assert_true(u && v && u->shape[1] == controls && v->shape[1] == n && v->shape[0] == 7);
+        pliant_vec3 *rest = malloc(n * sizeof *rest), *moved = malloc(n * sizeof *moved);
+        assert_true(rest && moved);
+        assert_int_equal(pliant_detail_evaluate(detail, NULL, rest, NULL), PLIANT_OK);
+        for (size_t step = 0; step < 7; step++) {
+            const pliant_vec3 *from = (const pliant_vec3 *)u->data + step * controls;
+            const pliant_vec3 *found = (const pliant_vec3 *)v->data + step * n;
+            assert_int_equal(pliant_detail_evaluate(detail, from, moved, NULL), PLIANT_OK);
+            float most = 0;
+            for (size_t i = 0; i < n; i++) {
+                check_near((double)found[i].x, (double)(moved[i].x - rest[i].x), 0);
+                check_near((double)found[i].y, (double)(moved[i].y - rest[i].y), 0);
+                check_near((double)found[i].z, (double)(moved[i].z - rest[i].z), 0);
+                if (found[i].z < most) most = found[i].z;
+            }
+            check_at_most((double)most, -0.005);
+        }
+        free(moved);
+        free(rest);
+        pliant_detail_destroy(detail);
+        pliant_model_close(model);
+        pliant_reader_close(fine);
+        pliant_reader_close(coarse);
+        check_run(0, "grep -o 'NumberOfPoints=.2562' skin/pliant_00000007.vtp");
+        check_run(0, "grep -c 'Name=\"normal\"' skin/pliant_00000007.vtp");
+    }
+    check_run(0, "rm -r coarse.h5 fine.h5 skin");
+    check_run(1, "$P -q --detail --vtk skin model.h5 poke.script");
+    assert_string_equal(err, "pliant-play: model.h5: /detail: expected geometric detail "
+                             "(pliant-precompute --detail), found none\n");
+    assert_false(exists("skin"));
+}
+
 static void comparison_with_the_dense_file_is_float_accurate(void **state)
 {
     (void)state;
@@ -910,6 +973,7 @@ int main(void)
         cmocka_unit_test(frames_hold_every_surface),
 #endif
         cmocka_unit_test(vtk_series_opens),
+        cmocka_unit_test(detailed_surfaces_are_those_of_the_library),
         cmocka_unit_test(comparison_with_the_dense_file_is_float_accurate),
         cmocka_unit_test(repeats_and_threads_play_the_same_and_count_all),
         cmocka_unit_test(missed_deadlines_are_told_and_are_no_failure),

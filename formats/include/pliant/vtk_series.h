@@ -1,8 +1,8 @@
 // vtk_series.h: write a deforming surface as a series of VTK files that ParaView opens.
 //
 // FOLDER/pliant.pvd lists one FOLDER/pliant_00000001.vtp per step: PolyData with the deformed
-// points, the triangles, and the point data `displacement` and `traction`, as single precision in
-// base64 (valid XML, any ParaView or VTK since 5.0). The files are made in FOLDER/pliant.tmp and
+// points, the triangles, and the point data `displacement`, `traction` and, where it is given,
+// `normal`, as single precision in base64 (valid XML, any ParaView or VTK since 5.0). The files are made in FOLDER/pliant.tmp and
 // moved to their place by commit, so a series that stood there before stays whole until then.
 // After create nothing allocates.
 #pragma once
@@ -28,10 +28,12 @@ typedef struct pliant_vtk_series pliant_vtk_series;
 PLIANT_UNUSED_RESULT pliant_status pliant_vtk_series_create(const pliant_vtk_series_def *def,
                                                             pliant_vtk_series **series,
                                                             pliant_error *err);
-// Write the next step: displacement [vertex_count], m; traction [vertex_count], N/m^2.
+// Write the next step: displacement [vertex_count], m; traction [vertex_count], N/m^2; unit normals
+// [vertex_count], or NULL.
 PLIANT_UNUSED_RESULT pliant_status pliant_vtk_series_add(pliant_vtk_series *series, double time,
                                                          const pliant_vec3 *displacement,
                                                          const pliant_vec3 *traction,
+                                                         const pliant_vec3 *normals,
                                                          pliant_error *err);
 // Replace our earlier series by this one. Ends the series' life whatever it returns.
 PLIANT_UNUSED_RESULT pliant_status pliant_vtk_series_commit(pliant_vtk_series *series,
