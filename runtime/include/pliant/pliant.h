@@ -217,8 +217,8 @@ PLIANT_CALL pliant_status pliant_solver_compliance(pliant_solver *solver, const 
 // after create, and threads may share it; the model must outlive it.
 //
 // Vertices 0 .. n-1 of the detail are those of the model, where these are at rest. They do not
-// follow it exactly: Loop's rule averages, so that a displacement prescribed at one vertex moves the
-// detail there by half of it and half of what its neighbours do.
+// follow it exactly: Loop's rule averages, so that where six edges meet the detail moves by half of
+// the vertex's displacement and half of its neighbours' mean.
 typedef struct pliant_detail pliant_detail;
 
 // Over the mesh of level `level`, with u that level's displacements; pliant_model_describe's
