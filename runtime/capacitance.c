@@ -218,6 +218,26 @@ static void set_scale(const pliant_model *model, pliant_capacitance *type, int32
     }
 }
 
+// How far to believe the element (i, j) of the passive M, and (j, i) for the rest. Compression leaves a
+// column with an error in proportion to its peak, which is near its own node: weighted by areas that
+// is A_i G_jj for (i, j), and the weights are those of least variance. A stiff part's column tells
+// how a thin part follows it; the thin part's, whose errors are as large as the stiff part's
+// displacements, does not. Of nodes on two levels the finer one's row is taken.
+static double trust(const pliant_capacitance *type, int32_t i, int32_t j, double area,
+                    double other_area)
+{
+    const int32_t level = type->nodes[i].level, other_level = type->nodes[j].level;
+    if (level != other_level) return level > other_level ? 1 : 0;
+    double mine = 0, other = 0;
+    for (size_t c = 0; c < 3; c++) {
+        mine += type->scale[3 * (size_t)i + c];
+        other += type->scale[3 * (size_t)j + c];
+    }
+    // D_ii^2 = 1 / (A_i G_ii), so this is (A_i G_jj) / (A_j G_ii).
+    const double ratio = area * mine / (other_area * other), square = ratio * ratio;
+    return 1 / (1 + square * square);
+}
+
 // Turn the values at two members of each other's columns (i == j: of its own) into elements of M.
 static void weigh_pair(const pliant_model *model, const pliant_capacitance_scratch *scratch,
                        pliant_capacitance *type, int32_t i, int32_t j)
@@ -231,8 +251,7 @@ static void weigh_pair(const pliant_model *model, const pliant_capacitance_scrat
     const double sign = model->domain[node.vertex] == model->domain[other.vertex] ? 1 : -1;
     const int is_passive = scratch->compliance == PLIANT_COMPLIANCE_PASSIVE;
     const double raise = i != j ? 0 : type->shift;
-    // Weights of (i, j) and of (j, i) in the passive element.
-    const double mine = node.level > other.level ? 1 : node.level < other.level ? 0 : 0.5;
+    const double mine = trust(type, i, j, area, other_area);
     for (size_t r = 0; r < 3; r++)
         for (size_t c = i == j ? r : 0; c < 3; c++) {
             double *to = at + r + c * leading, *back = opposite + c + r * leading;

@@ -20,9 +20,10 @@
 // first shift of 2^-20, 2^-16, 2^-12, ... that restores definiteness, so that values stay finite.
 //
 // Passive, M is symmetric and positive definite by construction (its skew part, between free and
-// freed fixed nodes, does no work): opposite elements are averaged; of nodes on two levels the
-// element at the finer vertex is taken for both, since there a point's displacement is near the
-// hat's mean, which is what reciprocity is about. Where the least eigenvalue is under 2^-10, the
+// freed fixed nodes, does no work): opposite elements are averaged, each weighted by how far its
+// column is to be believed; of nodes on two levels the element at the finer vertex is taken for
+// both, since there a point's displacement is near the hat's mean, which is what reciprocity is
+// about. Where the least eigenvalue is under 2^-10, the
 // diagonal is raised by a shift. All sets with one shift are parts of one matrix, so contact has one
 // elastic energy whatever nodes come and go; and a larger shift is a softer body, which only loses
 // energy. So the owner never lets the shift fall while there is contact (held_shift), and no loop
