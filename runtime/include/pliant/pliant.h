@@ -102,9 +102,10 @@ typedef enum pliant_compliance {
     PLIANT_COMPLIANCE_STORED = 0,
     // Symmetric and positive definite in the energy sense (weighted by the hats' areas), by
     // construction: opposite elements are averaged by how far their columns are to be believed, of
-    // two levels the one at the finer vertex is taken for both, and the diagonal is raised where the least eigenvalue falls short. Contact
-    // then has an elastic energy. The raise never falls until the last constraint is released, so
-    // that no loop through contact gains energy, whatever nodes come and go.
+    // two levels the one at the finer vertex is taken for both, and the diagonal is raised where
+    // the least eigenvalue falls short. Contact then has an elastic energy. The raise never falls
+    // until the last constraint is released, so that no loop through contact gains energy, whatever
+    // nodes come and go.
     PLIANT_COMPLIANCE_PASSIVE = 1,
 } pliant_compliance;
 
