@@ -115,8 +115,8 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
                          p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
                          p->free_count, p->fixed_count, 3 * p->vertex_count, size, size == 1 ? "" : "s", plan.kind);
     if (levels.last < p->multires->level_count - 1)
-        pliant_progress_note(progress, "columns of level%s %d to %d: %d solved for instead of %d",
-                             levels.first < levels.last ? "s" : "", levels.first, levels.last, solved, (int)rows);
+        pliant_progress_note(progress, "columns of levels %d..%d: %d are solved for instead of %.0f", levels.first,
+                             levels.last, solved, rows);
     pliant_progress_note(progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available; "
                          "temporary columns up to %.3g GB in %s",
                          needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9,
