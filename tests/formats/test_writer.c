@@ -203,6 +203,7 @@ static void h5dump_shows_the_numbers_and_the_attributes(void **state)
     check_contains(text, "ATTRIBUTE \"lifted\"");
     check_contains(text, "ATTRIBUTE \"max\"");
     check_contains(text, "ATTRIBUTE \"factor\"");
+    check_contains(text, "ATTRIBUTE \"smallest_eigenvalue\"");
     check_contains(text, "ATTRIBUTE \"rms\"");
     check_contains(text, "(0): 0.015");
     check_contains(text, "ATTRIBUTE \"program\"");
