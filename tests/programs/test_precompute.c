@@ -601,7 +601,7 @@ static void detail_keeps_the_shape_of_the_levels_it_takes_off(void **state)
 {
     (void)state;
     check_command c;
-    const char *whole = in_folder("whole.h5"), *fine = in_folder("fine.obj"), *shape = in_folder("shape.obj");
+    const char *whole = in_folder("undetailed.h5"), *fine = in_folder("fine.obj"), *shape = in_folder("shape.obj");
     char model[2][512];
     for (int k = 0; k < 2; k++) snprintf(model[k], sizeof model[k], "%s/detail%d.h5", check_folder(), k);
     check_run(&c, "%s/pliant-precompute -q %s %s -o %s && %s/pliant-info --export %s %s", check_build(), small_run,
