@@ -2,12 +2,14 @@
 #include "pending.h"
 
 #include <string.h>
+#include <time.h>
 
 // Members in a slice of extraction and of weighing.
 enum { slice_members = 8 };
 // Before a slice this many times its usual length must be left.
 static const double margin = 2;
-// What is not known yet is taken for this long; and the slow slices are forgotten at this rate.
+// What is not known yet is taken for this long. Slow slices are forgotten at this rate, also by waiting
+// for time to run one: the first of a kind pays for memory that was never touched.
 static const double first_slice_ns = 50e3, forget = 0.05;
 
 void pliant_pending_lay_out(pliant_arena *arena, const pliant_model *model, int32_t capacity,
@@ -73,6 +75,14 @@ static void run_slice(const pliant_model *model, pliant_capacitance_scratch *scr
     }
 }
 
+// What this thread worked, ns: a slice that was interrupted is no longer for it.
+static int64_t worked_ns(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return time.tv_sec * INT64_C(1000000000) + time.tv_nsec;
+}
+
 static int32_t is_busy(const pliant_pending *pending)
 {
     return pending->stage >= PLIANT_PENDING_PLAN && pending->stage <= PLIANT_PENDING_INVERT;
@@ -89,16 +99,19 @@ void pliant_pending_advance(const pliant_model *model, const pliant_node *nodes,
         begin(nodes, count, pending);
         pending->type.shift = scratch->held_shift;
     }
-    int64_t now = pliant_clock_ns();
+    int64_t worked = worked_ns();
     while (is_busy(pending)) {
         double *slice = &pending->slice_ns[pending->stage];
         if (*slice == 0) *slice = first_slice_ns;
-        if ((double)(deadline - now) < margin * *slice) return;
+        if ((double)(deadline - pliant_clock_ns()) < margin * *slice) {
+            *slice *= 1 - forget;
+            return;
+        }
         run_slice(model, scratch, pending);
-        const int64_t end = pliant_clock_ns();
-        const double taken = (double)(end - now);
+        const int64_t end = worked_ns();
+        const double taken = (double)(end - worked);
         *slice += (taken > *slice ? 1 : forget) * (taken - *slice);
-        now = end;
+        worked = end;
     }
 }
 
