@@ -82,7 +82,8 @@ LIB_draw       := $(OBJ)/libdraw.a
 LIB_support    := $(OBJ)/libsupport.a
 LIB_pliant     := $(OUT)/libpliant.a
 SO_pliant      := $(OUT)/libpliant.so.$(VERSION)
-SONAME         := libpliant.so.$(firstword $(subst ., ,$(VERSION)))
+# Before 1.0 a minor version may change the interface.
+SONAME         := libpliant.so.$(if $(filter 0.%,$(VERSION)),0.$(word 2,$(subst ., ,$(VERSION))),$(firstword $(subst ., ,$(VERSION))))
 
 PROGRAMS := $(OUT)/pliant-play $(OUT)/pliant-info
 SKIPPED  :=
