@@ -8,9 +8,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-// Two runs find the same number to the residual of either, 1e-4; a file that was written by a longer
-// or shorter one may be off by a little more.
-static const double stored_tolerance = 1e-3;
+// Two runs find the same number to the residuals of both, 1e-3 each.
+static const double stored_tolerance = 3e-3;
 
 double pliant_definiteness_ratio(const pliant_lanczos_result *level)
 {

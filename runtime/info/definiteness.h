@@ -10,7 +10,7 @@ typedef struct pliant_definiteness {
 } pliant_definiteness;
 
 // Recompute them from a model's free-free blocks. PLIANT_ERR_FORMAT: the file says otherwise of
-// itself, or its mesh has a vertex without area. Takes a second or two for 2562 vertices.
+// itself, or its mesh has a vertex without area. Takes about a second for 2562 vertices.
 PLIANT_UNUSED_RESULT pliant_status pliant_definiteness_measure(const pliant_contents *contents,
                                                                pliant_definiteness *definiteness,
                                                                pliant_error *err);

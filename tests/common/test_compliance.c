@@ -123,7 +123,7 @@ static void extremes(double *m, int32_t n, double *smallest, double *largest)
 }
 
 // What the operator's eigenvalues are known to.
-static const double tolerance = 2e-4;
+static const double tolerance = 1e-3;
 
 static void eigenvalues_are_those_of_the_dense_matrix(void **state)
 {

@@ -35,7 +35,7 @@ typedef struct pliant_compliance_def {
     void *context;
 } pliant_compliance_def;
 
-// Smallest and largest eigenvalue of M, to some 1e-4. Collective where columns are apart. All of
+// Smallest and largest eigenvalue of M, to 1e-3. Collective where columns are apart. All of
 // `def` is read during the call only. PLIANT_ERR_ARGUMENT: the level has no hats, or numbers are too
 // large for doubles.
 PLIANT_UNUSED_RESULT pliant_status pliant_compliance_eigenvalues(const pliant_compliance_def *def,
