@@ -268,20 +268,29 @@ static void weigh_pair(const pliant_model *model, const pliant_capacitance_scrat
 
 // ---- Inversion ----
 
-// Is the symmetric part of M + shift I positive definite? Uses work_matrix.
+// Is the symmetric part of M + shift I positive definite? Of a stored M only the parts within levels
+// are looked at: between levels not even exact elements are reciprocal, since the value at a coarse
+// vertex is not the mean under its hat, and a third of random mixed sets of an exact matrix would
+// look indefinite. Uses work_matrix.
 static int32_t is_definite(const pliant_capacitance *type, double shift,
                            pliant_capacitance_scratch *scratch)
 {
-    const size_t n = 3 * (size_t)type->count, leading = type->leading;
+    const size_t count = (size_t)type->count, leading = type->leading;
+    const int32_t is_passive = scratch->compliance == PLIANT_COMPLIANCE_PASSIVE;
     double *half = scratch->work_matrix;
-    for (size_t j = 0; j < n; j++) {
-        for (size_t i = j; i < n; i++)
-            half[i + j * leading] =
-                (type->matrix[i + j * leading] + type->matrix[j + i * leading]) / 2;
-        half[j + j * leading] += shift;
-    }
-    clear_tail(n, n, leading, half);
-    return pliant_dense_definite(n, leading, half, scratch->work);
+    for (size_t j = 0; j < count; j++)
+        for (size_t i = j; i < count; i++) {
+            const int32_t counts = is_passive || type->nodes[i].level == type->nodes[j].level;
+            for (size_t c = 3 * j; c < 3 * j + 3; c++)
+                for (size_t r = 3 * i; r < 3 * i + 3; r++)
+                    half[r + c * leading] = counts ? (type->matrix[r + c * leading] +
+                                                      type->matrix[c + r * leading]) /
+                                                         2
+                                                   : 0;
+        }
+    for (size_t k = 0; k < 3 * count; k++) half[k + k * leading] += shift;
+    clear_tail(3 * count, 3 * count, leading, half);
+    return pliant_dense_definite(3 * count, leading, half, scratch->work);
 }
 
 static void add_to_diagonal(pliant_capacitance *type, double shift)

@@ -4,6 +4,7 @@
 #include "capacitance.h"
 #include "synthetic_model.h"
 
+#include "pliant/hierarchy.h"
 #include "pliant/pliant.h"
 
 #include <math.h>
@@ -158,6 +159,52 @@ static void a_patch_with_one_absurdly_large_column_is_rough_and_finite(void **st
     check_spoilt(1e15f, PLIANT_ROUGH);
 }
 
+// Every vertex with its own level's hat, at random within some distance of each other: as far from
+// reciprocal as elements between levels get. Nothing is compressed, so nothing is spoilt.
+static void mixed_sets_of_an_exact_matrix_are_not_rough(void **state)
+{
+    (void)state;
+    enum { n = 642 };
+    const uint32_t all_levels = 15;
+    check_synthetic *s = check_synthetic_create(
+        &(check_synthetic_def){3, 0, pliant_wavelet_default(), CHECK_FREE_BLOCK, all_levels});
+    pliant_model *model = open_written(s);
+    pliant_solver *solver = NULL;
+    pliant_error err = {""};
+    const pliant_solver_def def = {
+        .constraint_capacity = 150, .load_capacity = 1, .cache_count = 1};
+    check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
+    const double *x = pliant_model_positions(model);
+    check_random random = check_random_seed(3);
+    int32_t mixed = 0;
+    for (int trial = 0; trial < 60; trial++) {
+        const int32_t centre = check_random_index(&random, n);
+        const double radius = 0.3 + 0.5 * check_random_next(&random);
+        const double part = check_random_next(&random);
+        int32_t used[4] = {0};
+        pliant_solver_release_all(solver);
+        for (int32_t v = 0; v < n; v++) {
+            double square = 0;
+            for (int c = 0; c < 3; c++) {
+                const double d = x[3 * (size_t)v + (size_t)c] - x[3 * (size_t)centre + (size_t)c];
+                square += d * d;
+            }
+            if (square > radius * radius || check_random_next(&random) > part ||
+                pliant_model_is_free(model, v) != 1)
+                continue;
+            const int32_t level = pliant_hierarchy_level_of(s->hierarchy, v);
+            const pliant_vec3 down = {0, 0, -0.1f};
+            if (pliant_solver_displace(solver, (pliant_node){level, v}, down) >= 0) used[level]++;
+        }
+        assert_int_equal(pliant_solver_solve(solver, PLIANT_NEVER), PLIANT_OK);
+        mixed += (used[0] > 0) + (used[1] > 0) + (used[2] > 0) + (used[3] > 0) >= 3;
+    }
+    check_at_least(mixed, 30);
+    pliant_solver_destroy(solver);
+    pliant_model_close(model);
+    check_synthetic_destroy(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -166,6 +213,7 @@ int main(void)
         cmocka_unit_test(an_indefinite_patch_is_rough_and_finite),
         cmocka_unit_test(a_singular_patch_is_rough_and_finite),
         cmocka_unit_test(a_patch_with_one_absurdly_large_column_is_rough_and_finite),
+        cmocka_unit_test(mixed_sets_of_an_exact_matrix_are_not_rough),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

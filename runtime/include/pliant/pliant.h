@@ -155,9 +155,9 @@ pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose 
 // that level, with that level's hat; it is left out when such a hat covers its vertex; else it
 // stays as it is. Then the status is PLIANT_LATE and the state is valid. What time is left goes into
 // the inverse of the full set, so that a contact that rests is resolved as stated after some
-// solves. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of
-// this patch is not positive definite; finite, displacements at S as specified, but forces are
-// unreliable.
+// solves. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of this patch, or of
+// its nodes of one level, is not positive definite; finite, displacements at S as specified, but
+// forces are unreliable.
 PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline);
 
 // Displacements of the whole surface up to `level` (GF-46, 47): u[level_vertex_count], m. Exact
