@@ -67,15 +67,13 @@ static void weigh_load(const pliant_solver *solver, pliant_load *load)
                                                 model->position[load->node.vertex]);
 }
 
-// Bounds, for every row domain: |base| <= magnitude = sum of |value| weight (times 3 for the three
-// columns of a block, left out on both sides). Adding `delta` rounds the product, at most 4 u
-// |delta| weight, and the sum, u times magnitude before or after.
-static void add_changes(pliant_solver *solver)
+// Add what changed in some loads; `moved` and the result bound and count it.
+static int32_t add_deltas(pliant_solver *solver, pliant_load *loads, int32_t count,
+                          double moved[PLIANT_DOMAIN_COUNT])
 {
-    double moved[PLIANT_DOMAIN_COUNT] = {0};
     int32_t changes = 0;
-    for (int32_t i = 0; i < solver->load_count; i++) {
-        pliant_load *load = &solver->loads[i];
+    for (int32_t i = 0; i < count; i++) {
+        pliant_load *load = &loads[i];
         const pliant_vec3 delta = difference(load->value, load->summed);
         if (is_zero(delta)) continue;
         if (load->weight[0] < 0) weigh_load(solver, load);
@@ -85,8 +83,28 @@ static void add_changes(pliant_solver *solver)
             moved[d] += norm(delta) * (double)load->weight[d];
         load->summed = load->value;
         changes++;
-        solver->report.summed_columns++;
     }
+    solver->report.summed_columns += changes;
+    return changes;
+}
+
+static double magnitude_of(const pliant_load *loads, int32_t count, int32_t d)
+{
+    double magnitude = 0;
+    for (int32_t i = 0; i < count; i++)
+        magnitude += norm(loads[i].value) * (double)loads[i].weight[d];
+    return magnitude;
+}
+
+// Bounds, for every row domain: |base| <= magnitude = sum of |value| weight (times 3 for the three
+// columns of a block, left out on both sides). Adding `delta` rounds the product, at most 4 u
+// |delta| weight, and the sum, u times magnitude before or after.
+static void add_changes(pliant_solver *solver)
+{
+    double moved[PLIANT_DOMAIN_COUNT] = {0};
+    int32_t changes = add_deltas(solver, solver->loads, solver->load_count, moved);
+    for (pliant_load_list *list = solver->lists; list; list = list->next)
+        changes += add_deltas(solver, list->loads, list->count, moved);
     const pliant_vec3 delta = difference(solver->gravity, solver->summed_gravity);
     if (!is_zero(delta)) {
         add_gravity(solver, delta);
@@ -101,28 +119,38 @@ static void add_changes(pliant_solver *solver)
     for (int32_t d = 0; d < solver->domain_count; d++) {
         pliant_field *field = &solver->fields[d];
         double magnitude = norm(solver->gravity) * (double)field->gravity_weight;
-        for (int32_t i = 0; i < solver->load_count; i++)
-            magnitude += norm(solver->loads[i].value) * (double)solver->loads[i].weight[d];
+        magnitude += magnitude_of(solver->loads, solver->load_count, d);
+        for (const pliant_load_list *list = solver->lists; list; list = list->next)
+            magnitude += magnitude_of(list->loads, list->count, d);
         field->drift += unit_roundoff * (changes * (magnitude + field->magnitude) + 5 * moved[d]);
         field->magnitude = magnitude;
         field->is_loaded = 1;
     }
 }
 
+// Sum some loads from scratch; returns how many there are.
+static int32_t add_summed(pliant_solver *solver, pliant_load *loads, int32_t count)
+{
+    int32_t added = 0;
+    for (int32_t i = 0; i < count; i++) {
+        if (is_zero(loads[i].summed)) continue;
+        add_load(solver, &loads[i], loads[i].summed);
+        added++;
+    }
+    solver->report.summed_columns += added;
+    return added;
+}
+
 // Sum everything again: the drift is then that of a fresh sum, which is what it is measured
 // against.
 static void rebuild_base(pliant_solver *solver)
 {
-    int32_t is_loaded = 0;
     for (int32_t d = 0; d < solver->domain_count; d++)
         memset(solver->fields[d].base, 0,
                4 * ((size_t)solver->model->domains[d].count + 1) * sizeof(float));
-    for (int32_t i = 0; i < solver->load_count; i++) {
-        if (is_zero(solver->loads[i].summed)) continue;
-        add_load(solver, &solver->loads[i], solver->loads[i].summed);
-        solver->report.summed_columns++;
-        is_loaded = 1;
-    }
+    int32_t is_loaded = add_summed(solver, solver->loads, solver->load_count) > 0;
+    for (pliant_load_list *list = solver->lists; list; list = list->next)
+        is_loaded |= add_summed(solver, list->loads, list->count) > 0;
     if (!is_zero(solver->summed_gravity)) {
         add_gravity(solver, solver->summed_gravity);
         solver->report.summed_columns += 3;
@@ -188,6 +216,11 @@ pliant_vec3 pliant_solver_boundary_value(const pliant_solver *solver, int32_t ve
                 pliant_constraint_find(solver->solved, solver->solved_count, node.vertex);
             // Both only between a statement and the solve that heeds it: then one is zero.
             if (load >= 0) sum = add_scaled(sum, weights[k], solver->loads[load].summed);
+            for (const pliant_load_list *list = solver->lists; list; list = list->next)
+                for (int32_t j = 0; j < list->count; j++)
+                    if (list->loads[j].node.vertex == node.vertex &&
+                        list->loads[j].node.level == level)
+                        sum = add_scaled(sum, weights[k], list->loads[j].summed);
             if (i >= 0 && solver->solved[i].node.level == level)
                 sum = add_scaled(sum, weights[k], solver->reference[i]);
         }

@@ -291,6 +291,11 @@ static void note_levels(pliant_solver *solver)
         const pliant_node node = solver->loads[i].node;
         solver->used_levels[domain[node.vertex]] |= 1u << node.level;
     }
+    for (const pliant_load_list *list = solver->lists; list; list = list->next)
+        for (int32_t i = 0; i < list->count; i++) {
+            const pliant_node node = list->loads[i].node;
+            solver->used_levels[domain[node.vertex]] |= 1u << node.level;
+        }
     for (int32_t i = 0; i < solver->solved_count; i++) {
         const pliant_node node = solver->solved[i].node;
         solver->used_levels[domain[node.vertex]] |= 1u << node.level;

@@ -23,6 +23,15 @@ typedef struct pliant_load {
         weight[PLIANT_DOMAIN_COUNT];  // largest number of its column in a row domain; -1: not known
 } pliant_load;
 
+// Tractions beside what the caller states, on any nodes, also of S, and any number on one. Their
+// owner changes the values between solves and says so in loads_changed; what was once summed may
+// leave the list only when `summed` is zero again.
+typedef struct pliant_load_list {
+    int32_t count;
+    pliant_load *loads;  // of the owner
+    struct pliant_load_list *next;
+} pliant_load_list;
+
 // What a domain's rows hold. Rows are [count + 1][4] floats, xyz0, the last one zero.
 typedef struct pliant_field {
     float *base;        // g of step (3): everything specified outside S; kept from solve to solve
@@ -70,6 +79,7 @@ struct pliant_solver {
     int32_t specified_count;         // without them
     pliant_load *loads;              // shape [2 load_capacity]
     int32_t *load_of;                // shape [n]: load that a vertex's node has now, or -1
+    pliant_load_list *lists;         // NULL: none
     int32_t loads_changed;
     pliant_vec3 gravity, summed_gravity;
 
@@ -108,6 +118,9 @@ int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t cou
 // list.
 int32_t pliant_loads_find(const pliant_solver *solver, pliant_node node);
 void pliant_loads_forget(pliant_solver *solver, int32_t load);
+// Enter a list; take it out again, with whatever of it is in the sum.
+void pliant_loads_add_list(pliant_solver *solver, pliant_load_list *list);
+void pliant_loads_drop_list(pliant_solver *solver, pliant_load_list *list);
 
 // Step (3), base.c: bring `base` up to date with the loads.
 void pliant_solver_update_base(pliant_solver *solver);
@@ -118,9 +131,15 @@ pliant_vec3 pliant_solver_boundary_value(const pliant_solver *solver, int32_t ve
 // Step (2), types.c: resolve the constraints so that the solve ends by `deadline` and have the type
 // of that set. solver->solved and solved_count become the set; the report is filled in.
 const pliant_capacitance *pliant_solver_resolve(pliant_solver *solver, int64_t deadline);
+// What solving for the constraints as they are stated would take, ns.
+double pliant_solver_predict(pliant_solver *solver);
 
 // types.c: use what is left until `deadline` for the set that was asked for, when it was not solved.
 void pliant_solver_prepare(pliant_solver *solver, int64_t deadline);
 
 // Step (6): bring a domain's g up to date as coefficients.
 void pliant_solver_sum(pliant_solver *solver, int32_t domain);
+
+// slack.c: where displaced node `member` of the last S would be if it alone were let go, m. 0: not
+// known, since the inverse has nothing for it.
+int32_t pliant_solver_slack(const pliant_solver *solver, int32_t member, pliant_vec3 *u);

@@ -84,6 +84,22 @@ int32_t pliant_loads_find(const pliant_solver *solver, pliant_node node)
     return search_loads(solver, node);
 }
 
+void pliant_loads_add_list(pliant_solver *solver, pliant_load_list *list)
+{
+    list->next = solver->lists;
+    solver->lists = list;
+}
+
+void pliant_loads_drop_list(pliant_solver *solver, pliant_load_list *list)
+{
+    pliant_load_list **at = &solver->lists;
+    while (*at != list) at = &(*at)->next;
+    *at = list->next;
+    // Its numbers go with it, so what it added can only be left out of a fresh sum.
+    for (int32_t d = 0; d < solver->domain_count; d++) solver->fields[d].drift = INFINITY;
+    solver->loads_changed = 1;
+}
+
 static pliant_status set_load(pliant_solver *solver, pliant_node node, pliant_vec3 value)
 {
     int32_t i = solver->load_of[node.vertex];
@@ -178,6 +194,8 @@ void pliant_solver_release_all(pliant_solver *solver)
     solver->scratch.held_shift = 0;
     for (int32_t i = solver->load_count; i-- > 0;)
         if (solver->loads[i].is_specified) drop_load(solver, solver->loads[i].node.vertex);
+    for (pliant_load_list *list = solver->lists; list; list = list->next)
+        for (int32_t i = 0; i < list->count; i++) list->loads[i].value = (pliant_vec3){0, 0, 0};
     solver->gravity = (pliant_vec3){0, 0, 0};
     solver->loads_changed = 1;
 }

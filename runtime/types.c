@@ -210,3 +210,8 @@ void pliant_solver_prepare(pliant_solver *solver, int64_t deadline)
     pending->type = replaced;
     pending->stage = PLIANT_PENDING_NONE;
 }
+
+double pliant_solver_predict(pliant_solver *solver)
+{
+    return plan_set(solver, solver->constraints, solver->constraint_count).total_ns;
+}
