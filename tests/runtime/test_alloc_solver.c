@@ -199,11 +199,72 @@ static void detailed_surfaces_and_points_allocate_nothing(void **state)
     pliant_model_close(model);
 }
 
+// Patches that move, grow, shrink and end, with time and without.
+static void patches_allocate_nothing(void **state)
+{
+    (void)state;
+    if (!COUNTING) skip();
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/pliant_test_alloc_%d.h5", (int)getpid());
+    check_write_synthetic_levels(path, NULL, 3, 0.05, pliant_wavelet_default(), CHECK_FREE_BLOCK);
+    pliant_error err = {""};
+    pliant_model *model = NULL;
+    pliant_solver *solver = NULL;
+    pliant_patch *patch = NULL;
+    check_ok(pliant_model_open(path, &model, &err), &err);
+    unlink(path);
+    const pliant_solver_def def = {
+        .constraint_capacity = 60, .load_capacity = 4, .cache_count = 3};
+    check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
+    const pliant_patch_def patch_def = {
+        .vertex_capacity = 150, .tolerance = 0.01, .hysteresis = 1.5, .blend_steps = 4};
+    check_ok(pliant_patch_create(solver, &patch_def, &patch, &err), &err);
+
+    const int32_t n = pliant_model_describe(model).vertex_count;
+    const double *x = pliant_model_positions(model);
+    static int32_t vertices[150];
+    static pliant_vec3 u[150];
+    int32_t late = 0, full = 0, blending = 0, most = 0;
+    const long before = atomic_load(&calls);
+    for (int frame = 0; frame < 300; frame++) {
+        const double top = 1 - 0.004 * (frame % 100);
+        int32_t count = 0;
+        for (int32_t v = 0; v < n && count < 150; v++) {
+            const double along = 0.8 * x[3 * (size_t)v] + 0.6 * x[3 * (size_t)v + 2];
+            if (along < 0.75 * top || pliant_model_is_free(model, v) != 1) continue;
+            vertices[count] = v;
+            u[count++] = (pliant_vec3){0, 0, (float)(0.9 * top - along)};
+        }
+        if (frame % 100 == 99) count = 0;
+        assert_int_equal(pliant_patch_set(patch, vertices, u, count), PLIANT_OK);
+        if (frame % 50 == 0)
+            assert_int_equal(pliant_patch_tolerate(patch, frame % 100 ? 0.001 : 0.02), PLIANT_OK);
+        const int64_t deadline = frame % 3 ? PLIANT_NEVER : pliant_clock_ns() + 100000;
+        assert_true(pliant_patch_solve(patch, deadline) >= 0);
+        const pliant_patch_report report = pliant_patch_last(patch);
+        late += report.is_late;
+        full += report.is_full;
+        blending += report.blending;
+        if (report.node_count > most) most = report.node_count;
+        (void)pliant_patch_force(patch);
+        if (frame == 150) pliant_solver_release_all(solver);
+    }
+    assert_int_equal(atomic_load(&calls) - before, 0);
+    check_at_least(late, 1);
+    check_at_least(full, 1);
+    check_at_least(blending, 100);
+    check_at_least(most, 50);
+    pliant_patch_destroy(patch);
+    pliant_solver_destroy(solver);
+    pliant_model_close(model);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(frames_of_all_kinds_allocate_nothing),
+        cmocka_unit_test(patches_allocate_nothing),
         cmocka_unit_test(detailed_surfaces_and_points_allocate_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

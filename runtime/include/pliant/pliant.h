@@ -264,3 +264,63 @@ PLIANT_CALL pliant_status pliant_detail_support(const pliant_detail *detail,
 // surface: values[control_count][width] to result[vertex_count][width].
 PLIANT_CALL pliant_status pliant_detail_interpolate(const pliant_detail *detail, int32_t width,
                                                     const float *values, float *result);
+
+// ---- Patch ----
+
+// A contact given on the finest scale, and met there to a tolerance with few nodes of mixed levels
+// (GF-68): where the prescribed displacements are smooth by coarse hats, elsewhere by finer ones.
+// What was chosen is kept from solve to solve, and nodes come and go smoothly. A patch need not be
+// connected. Several patches may share a solver, beside constraints and loads of the caller's own
+// on other vertices.
+typedef struct pliant_patch pliant_patch;
+
+typedef struct pliant_patch_def {
+    int32_t vertex_capacity;  // vertices in the patch. Default 512
+    double tolerance;         // m, largest |u - target| at a vertex of the patch; 0: all are nodes.
+                              // Default a 1000th of the diagonal of the model's box
+    // At least 1. A node is given up once the error without it was predicted below tolerance /
+    // hysteresis in several solves running. Default 2
+    double hysteresis;
+    int32_t blend_steps;  // solves that a node takes to come or go; 0: at once. Default 16
+} pliant_patch_def;
+PLIANT_API pliant_patch_def pliant_patch_default(const pliant_model *model);
+// `def` and `err` may be NULL. The solver is borrowed until destroy; its constraint_capacity bounds
+// the nodes.
+PLIANT_CALL pliant_status pliant_patch_create(pliant_solver *solver, const pliant_patch_def *def,
+                                              pliant_patch **patch, pliant_error *err);
+// Releases its nodes, for the next solve. Before its solver. NULL is fine.
+PLIANT_API void pliant_patch_destroy(pliant_patch *patch);
+
+// Replace the patch: free vertices, any order, and their displacements; u[count], m; copied. A
+// count of 0 ends the contact. Costs next to nothing. PLIANT_ERR_ARGUMENT: a vertex that is not
+// free or named twice, a number that is not finite. PLIANT_ERR_CAPACITY: more than vertex_capacity.
+PLIANT_CALL pliant_status pliant_patch_set(pliant_patch *patch, const int32_t *vertices,
+                                           const pliant_vec3 *u, int32_t count);
+// Another tolerance, m, from the next solve on. PLIANT_ERR_ARGUMENT: not finite or below 0.
+PLIANT_CALL pliant_status pliant_patch_tolerate(pliant_patch *patch, double tolerance);
+
+// Choose nodes, state them to the solver (which then says what pliant_solver_solve would), solve,
+// and refine until the error is within the tolerance. Everything of the solver can be read
+// afterwards. PLIANT_LATE: the deadline or the solver's room came first; the state is valid, but
+// the error (see the report) is above the tolerance. PLIANT_ROUGH as pliant_solver_solve. Does not
+// refuse.
+PLIANT_CALL pliant_status pliant_patch_solve(pliant_patch *patch, int64_t deadline);
+
+// Force that the patch exerts on the body, N: of its nodes and of those fading out.
+PLIANT_API pliant_vec3 pliant_patch_force(const pliant_patch *patch);
+// The nodes of the last solve (for drawing): the first `capacity` to nodes[capacity]; returns how
+// many there are. `nodes` may be NULL when capacity is 0.
+PLIANT_API int32_t pliant_patch_nodes(const pliant_patch *patch, pliant_node *nodes,
+                                      int32_t capacity);
+
+typedef struct pliant_patch_report {
+    int32_t vertex_count;
+    int32_t node_count;       // of the patch, without those fading out
+    int32_t level_count[16];  // nodes by level
+    int32_t solve_count;      // solves that this took, 1 when the last nodes were right
+    int32_t blending;         // nodes that have not reached their displacement, or are fading out
+    int32_t is_late;          // 1: the deadline came before the tolerance was met
+    int32_t is_full;          // 1: the solver's room did
+    double error;             // m, largest |u - target| at the patch's vertices
+} pliant_patch_report;
+PLIANT_API pliant_patch_report pliant_patch_last(const pliant_patch *patch);
