@@ -324,3 +324,28 @@ typedef struct pliant_patch_report {
     double error;             // m, largest |u - target| at the patch's vertices
 } pliant_patch_report;
 PLIANT_API pliant_patch_report pliant_patch_last(const pliant_patch *patch);
+
+// ---- Contact with rigid tools ----
+
+// Rigid tools pressed into the surface: a tool pushes and never pulls (unilateral contact), with
+// Coulomb friction if asked for. The contact takes as coarse a mix of levels as keeps the stated
+// tolerance, and lets a change of level take effect gradually, so that nothing pops when a tool
+// moves. It works through the solver's loads: what it states there stays until the next solve or
+// destroy, and a vertex about which the caller has stated something is never its node.
+
+// The body's surface stays outside of: a ball, a half-space (solid on the side that its normal
+// points away from), a ball swept along a segment.
+typedef enum pliant_tool_kind {
+    PLIANT_TOOL_NONE = 0,
+    PLIANT_TOOL_SPHERE = 1,
+    PLIANT_TOOL_PLANE = 2,
+    PLIANT_TOOL_CAPSULE = 3,
+} pliant_tool_kind;
+
+typedef struct pliant_tool {
+    pliant_tool_kind kind;
+    pliant_vec3 a;   // m; sphere: centre; plane: a point on it; capsule: one end
+    pliant_vec3 b;   // plane: normal, out of the solid, of any length but 0; capsule: other end, m
+    float radius;    // m, above 0; of spheres and capsules
+    float friction;  // Coulomb's coefficient, 0 to 2
+} pliant_tool;
