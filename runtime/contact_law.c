@@ -417,8 +417,7 @@ static void update_row(int32_t n, int32_t end, int32_t count, const double *rest
         return;
     }
     for (int32_t p = 0; p < count; p++)
-        for (size_t j = (size_t)end; j < width; j++)
-            row[j] -= factor[p] * u[(size_t)p * width + j];
+        for (size_t j = (size_t)end; j < width; j++) row[j] -= factor[p] * u[(size_t)p * width + j];
 }
 
 // x = a^-1 x by Gauss's elimination with row pivoting; `a` is row-major [n][n]. 0 when a pivot

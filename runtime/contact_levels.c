@@ -160,8 +160,7 @@ pliant_child_range pliant_contact_levels_children(const pliant_contact_levels *l
 {
     pliant_child_range range = {levels->child_begin[vertex], levels->child_begin[vertex]};
     const int32_t end = levels->child_begin[vertex + 1];
-    while (range.begin < end && levels->first[levels->children[range.begin]] < level)
-        range.begin++;
+    while (range.begin < end && levels->first[levels->children[range.begin]] < level) range.begin++;
     range.end = range.begin;
     while (range.end < end && levels->first[levels->children[range.end]] == level) range.end++;
     return range;

@@ -91,8 +91,7 @@ static void children_are_the_odd_vertices_on_the_edges(void **state)
     int32_t found = 0;
     for (int32_t v = 0; v < f.n; v++)
         for (int32_t level = 1; level <= f.finest; level++) {
-            const pliant_child_range range =
-                pliant_contact_levels_children(&f.levels, v, level);
+            const pliant_child_range range = pliant_contact_levels_children(&f.levels, v, level);
             for (int32_t i = range.begin; i < range.end; i++, found++) {
                 const int32_t child = f.levels.children[i];
                 assert_in_range(child, h->vertex_count[level - 1], h->vertex_count[level] - 1);
@@ -151,6 +150,14 @@ static void check_expressible(const fixture *f, check_random *random)
     free(hat);
 }
 
+static void check_no_child_is_replaced(const fixture *f, int32_t vertex)
+{
+    const int32_t level = f->levels.level[vertex];
+    const pliant_child_range range = pliant_contact_levels_children(&f->levels, vertex, level);
+    for (int32_t i = range.begin; i < range.end; i++)
+        assert_int_equal(f->levels.level[f->levels.children[i]], level);
+}
+
 static void replaced_nodes_keep_what_could_be_expressed(void **state)
 {
     (void)state;
@@ -167,6 +174,7 @@ static void replaced_nodes_keep_what_could_be_expressed(void **state)
                 const int32_t k =
                     f.levels.refined[check_random_index(&random, f.levels.refined_count)];
                 if (pliant_contact_levels_may_coarsen(&f.levels, k)) {
+                    check_no_child_is_replaced(&f, k);
                     pliant_contact_levels_coarsen(&f.levels, k);
                     coarsened++;
                 }
@@ -204,7 +212,8 @@ static void refining_at_a_vertex_gives_it_a_node_level_by_level(void **state)
         while (pliant_contact_levels_refine(&f.levels, v, replaced) > 0) continue;
         assert_false(pliant_contact_levels_exists(&f.levels, v));
     }
-    for (int32_t v = 0; v < f.n; v++) check_at_most(f.levels.level[v], f.levels.first[v] > 2 ? 3 : 2);
+    for (int32_t v = 0; v < f.n; v++)
+        check_at_most(f.levels.level[v], f.levels.first[v] > 2 ? 3 : 2);
     tear_down(&f);
 }
 

@@ -331,7 +331,8 @@ PLIANT_API pliant_patch_report pliant_patch_last(const pliant_patch *patch);
 // Coulomb friction if asked for. The contact takes as coarse a mix of levels as keeps the stated
 // tolerance, and lets a change of level take effect gradually, so that nothing pops when a tool
 // moves. It works through the solver's loads: what it states there stays until the next solve or
-// destroy, and a vertex about which the caller has stated something is never its node.
+// destroy, and a vertex about which the caller has stated something is never its node. Tools touch
+// free vertices; smaller than the finest triangles they slip between.
 
 // The body's surface stays outside of: a ball, a half-space (solid on the side that its normal
 // points away from), a ball swept along a segment.
@@ -349,3 +350,83 @@ typedef struct pliant_tool {
     float radius;    // m, above 0; of spheres and capsules
     float friction;  // Coulomb's coefficient, 0 to 2
 } pliant_tool;
+
+typedef struct pliant_contact pliant_contact;
+
+typedef struct pliant_contact_def {
+    int32_t node_capacity;  // nodes in contact or near it. Default 64, or the solver's capacities
+    int32_t tool_capacity;  // tools are numbered 0 .. tool_capacity - 1. Default 4, 64 at most
+    // How far the surface may enter a tool, and how far it may stand off where the tool's force
+    // acts on it (in proportion to the pressure there), m. Default: 1/500 of the longest side of
+    // the model's box.
+    double tolerance;
+    // Solves until a change of level has taken effect in full. Default 16; 0: at once, which pops.
+    int32_t fade_count;
+    int32_t coarsest_level, finest_level;  // of the nodes. Default: all that are stored
+} pliant_contact_def;
+PLIANT_API pliant_contact_def pliant_contact_default(const pliant_solver *solver);
+
+// The solver is borrowed until destroy; one contact for a solver. It must have passive compliance
+// and capacities for `node_capacity` nodes: constraint_capacity, and load_capacity, where loads of
+// the caller's leave the contact so many nodes less.
+PLIANT_CALL pliant_status pliant_contact_create(pliant_solver *solver,
+                                                const pliant_contact_def *def,
+                                                pliant_contact **contact, pliant_error *err);
+PLIANT_API void
+pliant_contact_destroy(pliant_contact *contact);  // takes its loads out; NULL is fine
+
+// Put tool `index` somewhere, or move it there; it takes effect in the next solve. A tool of the
+// same kind as before has moved rigidly (without spin about a capsule's axis or a plane's normal,
+// spheres without any), which is what friction follows. PLIANT_TOOL_NONE takes it away. Copied.
+// PLIANT_ERR_ARGUMENT: no such number, not finite, radius or friction out of range, a plane without
+// normal.
+PLIANT_CALL pliant_status pliant_contact_set_tool(pliant_contact *contact, int32_t index,
+                                                  const pliant_tool *tool);
+
+// In place of pliant_solver_solve: solve for the tools and leave the solver solved for the caller's
+// statements and the tools' forces, to be read as usual. Does not refuse. PLIANT_LATE: the deadline
+// (of pliant_clock_ns, or PLIANT_NEVER) came first, or the solver's constraints were resolved on
+// coarser levels for it; what there is, is the last pass that was completed, of which there is
+// always one: finite, and no tool pulls. A tool that moved by more than half its radius may be on
+// its way then; the next solve goes on.
+PLIANT_CALL pliant_status pliant_contact_solve(pliant_contact *contact, int64_t deadline);
+
+typedef struct pliant_tool_result {
+    pliant_vec3 force;   // N, what the tool exerts on the body
+    pliant_vec3 torque;  // N m, of that about the tool's point a
+    int32_t node_count;  // nodes that it pushes
+    float penetration;   // m, deepest vertex inside it
+} pliant_tool_result;
+PLIANT_API pliant_tool_result pliant_contact_tool(const pliant_contact *contact, int32_t index);
+
+// Nodes that tools push, for drawing and for tests.
+typedef struct pliant_contact_node {
+    pliant_node node;
+    int32_t tool;
+    pliant_vec3 force;   // N, on the body
+    pliant_vec3 normal;  // out of the tool, along which it pushes
+    float gap;           // m, of the node's vertex; below 0: inside
+    int32_t is_sliding;  // 1: friction is at its limit
+} pliant_contact_node;
+PLIANT_API pliant_contact_node pliant_contact_get(const pliant_contact *contact,
+                                                  int32_t i);  // 0 .. node_count of last - 1
+
+// What the last solve did; times are monotonic nanoseconds.
+typedef struct pliant_contact_report {
+    int32_t node_count;                    // pairs of a node and a tool that pushes it
+    int32_t watched_count;                 // nodes in the complementarity problem
+    int32_t candidate_count;               // vertices whose distance was evaluated
+    int32_t coarsest_level, finest_level;  // of the nodes that are pushed; -1: none
+    int32_t iterations;                    // passes of: contact law, solve, distances
+    int32_t pivots;              // active sets or, with friction, sweeps, of all passes together
+    int32_t refined, coarsened;  // nodes that went to another level
+    int32_t is_late;             // 1: PLIANT_LATE
+    int32_t is_met;              // 1: the tolerance is kept everywhere
+    double penetration;          // m, deepest vertex inside a tool
+    double error;                // m, the worst of what the tolerance is about
+    double residual;  // m, of the contact conditions at the nodes; 0.01 tolerances aimed at
+    // Compliances of nodes, contact law, the solver's solves, and all.
+    int64_t compliance_ns, law_ns, solve_ns, total_ns;
+    int64_t lateness_ns;  // end less the deadline; 0 when in time
+} pliant_contact_report;
+PLIANT_API pliant_contact_report pliant_contact_last(const pliant_contact *contact);
