@@ -9,6 +9,7 @@
 #include "pliant/pliant.h"
 
 #include <stdatomic.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -259,12 +260,72 @@ static void patches_allocate_nothing(void **state)
     pliant_model_close(model);
 }
 
+static void frames_of_tools_allocate_nothing(void **state)
+{
+    (void)state;
+    if (!COUNTING) skip();
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/pliant_test_alloc_%d.h5", (int)getpid());
+    check_write_synthetic_levels(path, NULL, 3, 0.05, pliant_wavelet_default(), CHECK_FREE_BLOCK);
+    pliant_error err = {""};
+    pliant_model *model = NULL;
+    pliant_solver *solver = NULL;
+    pliant_contact *contact = NULL;
+    check_ok(pliant_model_open(path, &model, &err), &err);
+    unlink(path);
+    pliant_solver_def def = pliant_solver_default(model);
+    def.compliance = PLIANT_COMPLIANCE_PASSIVE;
+    check_ok(pliant_solver_create(model, &def, &solver, &err), &err);
+    pliant_contact_def contact_def = pliant_contact_default(solver);
+    contact_def.tolerance = 0.02;
+    check_ok(pliant_contact_create(solver, &contact_def, &contact, &err), &err);
+
+    int32_t most = 0, refined = 0, coarsened = 0, late = 0;
+    const long before = atomic_load(&calls);
+    for (int frame = 0; frame < 400; frame++) {
+        const double angle = 0.005 * frame, distance = 2.85 + (frame % 100 < 30 ? 0.3 : 0);
+        const pliant_tool ball = {
+            .kind = PLIANT_TOOL_SPHERE,
+            .a = {(float)(distance * sin(angle)), 0, (float)(distance * cos(angle))},
+            .radius = 2,
+            .friction = frame % 200 < 100 ? 0 : 0.3f};
+        const pliant_tool plane = {.kind = PLIANT_TOOL_PLANE,
+                                   .a = {0, 1 - 0.0005f * (float)frame, 0},
+                                   .b = {0, -1, 0}};
+        assert_int_equal(pliant_contact_set_tool(contact, 0, &ball), PLIANT_OK);
+        assert_int_equal(pliant_contact_set_tool(contact, 1, &plane), PLIANT_OK);
+        if (frame % 50 == 0)
+            assert_int_equal(pliant_solver_displace(solver, (pliant_node){3, 40 + frame / 50},
+                                                    (pliant_vec3){0, 0.02f, 0}),
+                             PLIANT_OK);
+        const pliant_status status = pliant_contact_solve(
+            contact, frame % 10 == 9 ? pliant_clock_ns() : PLIANT_NEVER);
+        assert_true(status >= 0);
+        const pliant_contact_report report = pliant_contact_last(contact);
+        if (report.node_count > most) most = report.node_count;
+        refined += report.refined;
+        coarsened += report.coarsened;
+        late += status == PLIANT_LATE;
+        for (int32_t i = 0; i < report.node_count; i++) (void)pliant_contact_get(contact, i);
+    }
+    assert_int_equal(atomic_load(&calls) - before, 0);
+    // The frames were what they claim.
+    check_at_least(most, 10);
+    check_at_least(refined, 10);
+    check_at_least(coarsened, 5);
+    check_at_least(late, 10);
+    pliant_contact_destroy(contact);
+    pliant_solver_destroy(solver);
+    pliant_model_close(model);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_counter_counts),
         cmocka_unit_test(frames_of_all_kinds_allocate_nothing),
         cmocka_unit_test(patches_allocate_nothing),
+        cmocka_unit_test(frames_of_tools_allocate_nothing),
         cmocka_unit_test(detailed_surfaces_and_points_allocate_nothing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
