@@ -248,7 +248,7 @@ $(OUT)/bench/%.h5: $(OUT)/pliant-precompute
 	    mpirun --quiet -n 2 $< -q --force --rms 0.05 --max 0.11 $(WAVELET) $(SAMPLE) $(MORE) -o $@
 bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS) $(DETAIL_MODEL)  ## run the benchmarks: figures against baselines measured in the same run
 	@. scripts/environment; for b in $(BENCHES); do echo "== $${b##*/}"; \
-	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy | */bench_patch) models="$(BENCH_MODELS)";; \
+	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy | */bench_patch | */bench_tool) models="$(BENCH_MODELS)";; \
 	        */bench_detail) models="$(DETAIL_MODEL)";; *) models="";; esac; \
 	    PLIANT_BUILD=$(OUT) $$b $$models || exit 1; done
 
