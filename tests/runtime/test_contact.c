@@ -794,6 +794,29 @@ static void few_levels_and_few_nodes_do_what_they_can(void **state)
     tear_down(&f);
 }
 
+static void models_of_coarse_levels_alone_have_tools_too(void **state)
+{
+    (void)state;
+    check_synthetic *coarse =
+        check_synthetic_create(&(check_synthetic_def){.levels = depth_levels,
+                                                      .wavelet = pliant_wavelet_default(),
+                                                      .blocks = CHECK_FREE_BLOCK,
+                                                      .level_mask = 3});
+    fixture f = open_model(coarse);
+    assert_int_equal(pliant_contact_default(f.solver).finest_level, 1);
+    begin_contact(&f, 0.01, 0, 16);
+    for (int step = 0; step < 60; step++) {
+        const pliant_tool tool = plane_above(0.005 * step, 0, 0.1);
+        assert_int_equal(solve_with(&f, 0, tool), PLIANT_OK);
+        check_forces(&f, &tool, 1);
+    }
+    const pliant_contact_report report = pliant_contact_last(f.contact);
+    check_at_least(report.node_count, 1);
+    check_at_most(report.finest_level, 1);
+    tear_down(&f);
+    check_synthetic_destroy(coarse);
+}
+
 static void compressed_models_meet_the_tolerance_too(void **state)
 {
     (void)state;
@@ -1160,6 +1183,7 @@ int main(void)
         cmocka_unit_test(a_wide_hat_does_not_press_where_nothing_is),
         cmocka_unit_test(a_tool_at_rest_comes_to_rest),
         cmocka_unit_test(few_levels_and_few_nodes_do_what_they_can),
+        cmocka_unit_test(models_of_coarse_levels_alone_have_tools_too),
         cmocka_unit_test(compressed_models_meet_the_tolerance_too),
         cmocka_unit_test(the_callers_statements_hold),
         cmocka_unit_test(held_vertices_are_never_nodes),
