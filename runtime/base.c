@@ -41,7 +41,7 @@ static void add_column(const pliant_solver *solver, int32_t row_domain, pliant_n
                        value, rows);
 }
 
-static void add_load(pliant_solver *solver, pliant_load *load, pliant_vec3 value)
+static void add_load(pliant_solver *solver, const pliant_load *load, pliant_vec3 value)
 {
     const float numbers[3] = {value.x, value.y, value.z};
     for (int32_t d = 0; d < solver->domain_count; d++)
@@ -216,11 +216,7 @@ pliant_vec3 pliant_solver_boundary_value(const pliant_solver *solver, int32_t ve
                 pliant_constraint_find(solver->solved, solver->solved_count, node.vertex);
             // Both only between a statement and the solve that heeds it: then one is zero.
             if (load >= 0) sum = add_scaled(sum, weights[k], solver->loads[load].summed);
-            for (const pliant_load_list *list = solver->lists; list; list = list->next)
-                for (int32_t j = 0; j < list->count; j++)
-                    if (list->loads[j].node.vertex == node.vertex &&
-                        list->loads[j].node.level == level)
-                        sum = add_scaled(sum, weights[k], list->loads[j].summed);
+            sum = add_scaled(sum, weights[k], pliant_load_lists_summed(solver, node));
             if (i >= 0 && solver->solved[i].node.level == level)
                 sum = add_scaled(sum, weights[k], solver->reference[i]);
         }

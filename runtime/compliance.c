@@ -22,6 +22,8 @@ static pliant_status check_nodes(const pliant_solver *solver, const pliant_node 
 {
     if (count < 0 || count > solver->constraint_capacity || (count > 0 && (!nodes || !matrix)))
         return PLIANT_ERR_ARGUMENT;
+    // A solution that was received came without its matrix.
+    if (solver->solved_count > 0 && !solver->solved_type) return PLIANT_ERR_MISSING;
     for (int32_t i = 0; i < count; i++) {
         const pliant_status status = pliant_model_check_node(solver->model, nodes[i]);
         if (status < 0) return status;

@@ -93,7 +93,7 @@ pliant_status pliant_patch_create(pliant_solver *solver, const pliant_patch_def 
     lay_out(&patch->arena, patch);
     memset(patch->index_of, 0xff, (size_t)model->vertex_count * sizeof *patch->index_of);
     pliant_footprint_begin(model, &patch->footprint);
-    pliant_loads_add_list(solver, &patch->fading);
+    pliant_load_list_enter(solver, &patch->fading);
     *result = patch;
     return PLIANT_OK;
 }
@@ -106,7 +106,7 @@ void pliant_patch_destroy(pliant_patch *patch)
         if (pliant_patch_owns(patch, v))
             (void)!pliant_solver_release(patch->solver, (pliant_node){v->level, v->vertex});
     }
-    pliant_loads_drop_list(patch->solver, &patch->fading);
+    pliant_load_list_leave(patch->solver, &patch->fading);
     pliant_arena_release(&patch->arena);
     free(patch);
 }

@@ -302,6 +302,26 @@ static void note_levels(pliant_solver *solver)
     }
 }
 
+// The contact is solved: what follows from it.
+static void finish(pliant_solver *solver)
+{
+    note_levels(solver);
+    // The fixed rows are summed when somebody asks for them.
+    for (int32_t d = 0; d < solver->domain_count; d++) solver->fields[d].is_summed = 0;
+    pliant_solver_sum(solver, PLIANT_DOMAIN_FREE);
+}
+
+void pliant_solver_adopt(pliant_solver *solver, const pliant_constraint *solved,
+                         const pliant_vec3 *reference, int32_t count)
+{
+    pliant_solver_update_base(solver);
+    memcpy(solver->solved, solved, (size_t)count * sizeof *solved);
+    memcpy(solver->reference, reference, (size_t)count * sizeof *reference);
+    solver->solved_count = count;
+    solver->solved_type = NULL;
+    finish(solver);
+}
+
 pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline)
 {
     const int64_t begin = pliant_clock_ns();
@@ -316,10 +336,7 @@ pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline)
     const int64_t typed = pliant_clock_ns();
     if (type) solve_contact(solver, type);
     const int64_t solved = pliant_clock_ns();
-    note_levels(solver);
-    // The fixed rows are summed when somebody asks for them.
-    for (int32_t d = 0; d < solver->domain_count; d++) solver->fields[d].is_summed = 0;
-    pliant_solver_sum(solver, PLIANT_DOMAIN_FREE);
+    finish(solver);
     const int64_t done = pliant_clock_ns();
     if (solver->report.is_late) pliant_solver_prepare(solver, deadline);
     const int64_t end = pliant_clock_ns();
@@ -330,6 +347,18 @@ pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline)
     solver->report.summation_ns = (summed - begin) + (done - solved);
     if (type && type->status == PLIANT_ROUGH) return PLIANT_ROUGH;
     return solver->report.is_late || solver->report.lateness_ns > 0 ? PLIANT_LATE : PLIANT_OK;
+}
+
+void pliant_solver_repeat(pliant_solver *solver)
+{
+    const int64_t begin = pliant_clock_ns();
+    pliant_solver_update_base(solver);
+    const int64_t summed = pliant_clock_ns();
+    if (solver->solved_type) solve_contact(solver, solver->solved_type);
+    const int64_t solved = pliant_clock_ns();
+    finish(solver);
+    solver->report.contact_ns += solved - summed;
+    solver->report.summation_ns += (summed - begin) + (pliant_clock_ns() - solved);
 }
 
 pliant_solver_report pliant_solver_last(const pliant_solver *solver)

@@ -30,6 +30,7 @@ typedef struct pliant_load_list {
     int32_t count;
     pliant_load *loads;  // of the owner
     struct pliant_load_list *next;
+    int32_t is_entered;  // the owner's note
 } pliant_load_list;
 
 // What a domain's rows hold. Rows are [count + 1][4] floats, xyz0, the last one zero.
@@ -118,9 +119,19 @@ int32_t pliant_constraint_find(const pliant_constraint *constraints, int32_t cou
 // list.
 int32_t pliant_loads_find(const pliant_solver *solver, pliant_node node);
 void pliant_loads_forget(pliant_solver *solver, int32_t load);
-// Enter a list; take it out again, with whatever of it is in the sum.
-void pliant_loads_add_list(pliant_solver *solver, pliant_load_list *list);
-void pliant_loads_drop_list(pliant_solver *solver, pliant_load_list *list);
+// statements.c: state a load, for which there is room.
+void pliant_loads_set(pliant_solver *solver, pliant_node node, pliant_vec3 value);
+
+// load_list.c: enter a list; take it out again, with whatever of it is in the sum.
+void pliant_load_list_enter(pliant_solver *solver, pliant_load_list *list);
+void pliant_load_list_leave(pliant_solver *solver, pliant_load_list *list);
+// All its tractions become zero. Then one more, which stays until the next clear; loads has room for
+// `capacity`, of which those still on their way out of the sum take a part. 0: there is none left.
+void pliant_load_list_clear(pliant_solver *solver, pliant_load_list *list);
+int32_t pliant_load_list_press(pliant_solver *solver, pliant_load_list *list, int32_t capacity,
+                               pliant_node node, pliant_vec3 traction);
+// What all lists had at a node in the last solve.
+pliant_vec3 pliant_load_lists_summed(const pliant_solver *solver, pliant_node node);
 
 // Step (3), base.c: bring `base` up to date with the loads.
 void pliant_solver_update_base(pliant_solver *solver);
@@ -136,6 +147,11 @@ double pliant_solver_predict(pliant_solver *solver);
 
 // types.c: use what is left until `deadline` for the set that was asked for, when it was not solved.
 void pliant_solver_prepare(pliant_solver *solver, int64_t deadline);
+// Solve again on the same S with the same type, for other loads.
+void pliant_solver_repeat(pliant_solver *solver);
+// Steps (2) to (5) done elsewhere: take S and what was solved for it over, and sum.
+void pliant_solver_adopt(pliant_solver *solver, const pliant_constraint *solved,
+                         const pliant_vec3 *reference, int32_t count);
 
 // Step (6): bring a domain's g up to date as coefficients.
 void pliant_solver_sum(pliant_solver *solver, int32_t domain);

@@ -84,28 +84,9 @@ int32_t pliant_loads_find(const pliant_solver *solver, pliant_node node)
     return search_loads(solver, node);
 }
 
-void pliant_loads_add_list(pliant_solver *solver, pliant_load_list *list)
-{
-    list->next = solver->lists;
-    solver->lists = list;
-}
-
-void pliant_loads_drop_list(pliant_solver *solver, pliant_load_list *list)
-{
-    pliant_load_list **at = &solver->lists;
-    while (*at != list) at = &(*at)->next;
-    *at = list->next;
-    // Its numbers go with it, so what it added can only be left out of a fresh sum.
-    for (int32_t d = 0; d < solver->domain_count; d++) solver->fields[d].drift = INFINITY;
-    solver->loads_changed = 1;
-}
-
-static pliant_status set_load(pliant_solver *solver, pliant_node node, pliant_vec3 value)
+void pliant_loads_set(pliant_solver *solver, pliant_node node, pliant_vec3 value)
 {
     int32_t i = solver->load_of[node.vertex];
-    if ((i < 0 || !solver->loads[i].is_specified) &&
-        solver->specified_count == solver->load_capacity)
-        return PLIANT_ERR_CAPACITY;
     if (i >= 0 && solver->loads[i].node.level != node.level) {
         // What the vertex had on another level leaves the sum with the next solve; what it had on
         // this one may not have left yet.
@@ -122,6 +103,15 @@ static pliant_status set_load(pliant_solver *solver, pliant_node node, pliant_ve
     solver->loads[i].value = value;
     solver->loads_changed = 1;
     drop_constraint(solver, node.vertex);
+}
+
+static pliant_status set_load(pliant_solver *solver, pliant_node node, pliant_vec3 value)
+{
+    const int32_t i = solver->load_of[node.vertex];
+    if ((i < 0 || !solver->loads[i].is_specified) &&
+        solver->specified_count == solver->load_capacity)
+        return PLIANT_ERR_CAPACITY;
+    pliant_loads_set(solver, node, value);
     return PLIANT_OK;
 }
 
@@ -195,7 +185,7 @@ void pliant_solver_release_all(pliant_solver *solver)
     for (int32_t i = solver->load_count; i-- > 0;)
         if (solver->loads[i].is_specified) drop_load(solver, solver->loads[i].node.vertex);
     for (pliant_load_list *list = solver->lists; list; list = list->next)
-        for (int32_t i = 0; i < list->count; i++) list->loads[i].value = (pliant_vec3){0, 0, 0};
+        pliant_load_list_clear(solver, list);
     solver->gravity = (pliant_vec3){0, 0, 0};
     solver->loads_changed = 1;
 }
