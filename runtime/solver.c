@@ -60,6 +60,7 @@ static void lay_out(pliant_arena *arena, pliant_solver *solver)
     PLIANT_TAKE(arena, solver->contact_values, 3 * (size_t)capacity);
     PLIANT_TAKE(arena, solver->contact_solution, pliant_dense_stride(3 * (size_t)capacity));
     PLIANT_TAKE(arena, solver->loads, 2 * (size_t)solver->load_capacity);
+    PLIANT_TAKE(arena, solver->received.loads, 2 * pliant_exchange_room(solver->load_capacity));
     PLIANT_TAKE(arena, solver->load_of, model->vertex_count);
     PLIANT_TAKE(arena, solver->fixed_displacement, 4 * (size_t)model->domains[1].count);
     PLIANT_TAKE(arena, solver->all_rows, rows);

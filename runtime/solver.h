@@ -81,6 +81,7 @@ struct pliant_solver {
     pliant_load *loads;              // shape [2 load_capacity]
     int32_t *load_of;                // shape [n]: load that a vertex's node has now, or -1
     pliant_load_list *lists;         // NULL: none
+    pliant_load_list received;       // of the solution taken over from an exchange
     int32_t loads_changed;
     pliant_vec3 gravity, summed_gravity;
 
@@ -132,6 +133,9 @@ int32_t pliant_load_list_press(pliant_solver *solver, pliant_load_list *list, in
                                pliant_node node, pliant_vec3 traction);
 // What all lists had at a node in the last solve.
 pliant_vec3 pliant_load_lists_summed(const pliant_solver *solver, pliant_node node);
+
+// exchange.c: how many loads of lists an exchange carries for solvers of this capacity.
+int32_t pliant_exchange_room(int32_t load_capacity);
 
 // Step (3), base.c: bring `base` up to date with the loads.
 void pliant_solver_update_base(pliant_solver *solver);

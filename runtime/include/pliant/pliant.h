@@ -430,3 +430,87 @@ typedef struct pliant_contact_report {
     int64_t lateness_ns;  // end less the deadline; 0 when in time
 } pliant_contact_report;
 PLIANT_API pliant_contact_report pliant_contact_last(const pliant_contact *contact);
+
+// ---- Point haptics ----
+
+// A point that a device drags over the deformed surface (a "god object", Zilles and Salisbury
+// 1995): where the device is while that is outside, held back on the surface while it is inside.
+// A virtual coupling, a spring that is at most as stiff as the definition says, pulls the proxy
+// towards the device. Its force acts on the body at the touched face (by the hats of the finest
+// stored level there) in addition to whatever the solver's statements say, never in their place.
+//
+// Without friction the force stands along a normal that is interpolated between vertices, so that
+// force and place are continuous over edges and the mesh is not felt (Morgenbesser and Srinivasan
+// 1996; GF 9.3). Whatever the normals, and whatever compression did, no closed path of the device
+// gains energy. That is one proxy's; of several devices on one body it is true for what the solver
+// displaces with passive compliance.
+//
+// A proxy has one solver, which outlives it and is used by the same thread; a solver may have
+// several.
+typedef struct pliant_proxy pliant_proxy;
+
+typedef struct pliant_proxy_def {
+    double stiffness;  // of the virtual coupling, N/m, above 0. Default: four times Young's modulus
+                       // times the root of the mean vertex area, some three times a vertex's own
+    double friction;   // Coulomb's coefficient, 0 or more. Default 0
+    // The normal map: a more detailed surface's normals at rest, of any length, shape [n][3];
+    // copied. They turn with the surface. Within 84 degrees of the mesh's own, which are the
+    // default, NULL. A model's detail has some: pliant_detail_evaluate, the first n.
+    const float *normals;
+} pliant_proxy_def;
+PLIANT_API pliant_proxy_def pliant_proxy_default(const pliant_model *model);
+PLIANT_CALL pliant_status pliant_proxy_create(pliant_solver *solver, const pliant_proxy_def *def,
+                                              pliant_proxy **proxy, pliant_error *err);
+PLIANT_API void pliant_proxy_destroy(pliant_proxy *proxy);  // takes its force away; NULL is fine
+
+typedef struct pliant_proxy_result {
+    int32_t face;          // that is touched, of the finest level; -1: in free space
+    float weights[3];      // of the face's corners at the contact; sum 1
+    double position[3];    // of the proxy, m: on the surface as solved, or where the device is
+    pliant_vec3 normal;    // outward, smoothed, unit; 0 in free space
+    pliant_vec3 force;     // on the body, N; the device gets the opposite. 0 in free space
+    double depth;          // of the device along the normal under the surface without the force, m
+    double energy;         // held by the body's contact and the coupling, J
+    double brake;          // part of the force that is against the device's motion, where that
+                           // would have got energy that nobody put in, N; mostly 0
+    int32_t is_sliding;    // 1: the proxy moved over the surface in this step
+    int32_t vertex_count;  // vertices that this step evaluated
+    int64_t step_ns;       // of the whole step
+} pliant_proxy_result;
+
+// One haptic step: solve for what the solver's statements say now, move the proxy towards the
+// device at `position` (shape [3], m), let its force act and solve again. Afterwards the solver's
+// solution (surface, displacements, publish, ...) includes the force. Cost follows what is touched,
+// not the mesh. As in pliant_solver_solve, constraints are resolved on a coarser level when the
+// step would not end by `deadline`: PLIANT_LATE; PLIANT_ROUGH likewise. PLIANT_ERR_ARGUMENT: a
+// position that is not finite.
+PLIANT_CALL pliant_status pliant_proxy_step(pliant_proxy *proxy, const double *position,
+                                            int64_t deadline, pliant_proxy_result *result);
+// Lift the proxy off, its force with it (from the next solve on), and let the next step begin at
+// `position`, whatever is in between. The first step begins where its device is. Beginning inside
+// the body is being put on the nearest surface.
+PLIANT_CALL pliant_status pliant_proxy_place(pliant_proxy *proxy, const double *position);
+
+// ---- Two threads ----
+
+// Carries solutions from the thread that solves (haptics, 1 kHz) to one that looks (graphics, 60
+// Hz): a triple buffer, so that neither ever waits for the other and the looker gets the newest.
+// For one publishing and one receiving thread.
+typedef struct pliant_exchange pliant_exchange;
+
+// Room for solutions of solvers of this definition (NULL: the default) on the model, which outlives
+// it.
+PLIANT_CALL pliant_status pliant_exchange_create(const pliant_model *model,
+                                                 const pliant_solver_def *def,
+                                                 pliant_exchange **exchange, pliant_error *err);
+PLIANT_API void pliant_exchange_destroy(pliant_exchange *exchange);  // NULL is fine
+// Put the last solve's solution there: a copy of some 30 bytes a constraint or load.
+// PLIANT_ERR_ARGUMENT: a solver on another model. PLIANT_ERR_CAPACITY: more than there is room for.
+PLIANT_CALL pliant_status pliant_solver_publish(const pliant_solver *solver,
+                                                pliant_exchange *exchange);
+// Take the newest solution over into another solver on the model, as if it had been told the same
+// and had solved, but without solving: only what changed is summed. What it had been told before is
+// forgotten; on a late solution it knows the coarser constraints. 1: done; 0: nothing newer than
+// the last one taken; PLIANT_ERR_ARGUMENT: a solver on another model; PLIANT_ERR_CAPACITY: its
+// definition has less room than the exchange's. Compliance is PLIANT_ERR_MISSING until it solves.
+PLIANT_API int32_t pliant_solver_receive(pliant_solver *viewer, pliant_exchange *exchange);
