@@ -58,6 +58,7 @@ I_common     := -Icommon/include -Icommon
 I_formats    := -Icommon/include -Iformats/include -Iformats
 I_precompute := -Icommon/include -Iformats/include -Iprecompute
 I_runtime    := -Icommon/include -Iformats/include -Iruntime/include -Iruntime -Iruntime/play
+I_examples   := -Icommon/include -Iruntime/include
 I_tests      := -Icommon/include -Iformats/include -Iruntime/include -Iprecompute -Iruntime -Iruntime/play -Icommon -Iformats -Itests/support
 
 SRC_common     := $(sort $(wildcard common/*.c))
@@ -68,6 +69,7 @@ SRC_runtime    := $(sort $(wildcard runtime/*.c))
 SRC_play       := $(sort $(filter-out runtime/play/main.c,$(wildcard runtime/play/*.c)))
 SRC_info       := $(sort $(filter-out runtime/info/main.c,$(wildcard runtime/info/*.c)))
 SRC_draw       := $(sort $(filter-out runtime/draw/main.c,$(wildcard runtime/draw/*.c)))
+SRC_examples   := $(sort $(wildcard runtime/examples/*.c))
 SRC_support    := $(sort $(wildcard tests/support/*.c))
 objects = $(patsubst %.c,$(OBJ)/%.o,$(1))
 
@@ -103,7 +105,9 @@ endif
 
 # ---- Targets ----
 
-all: $(PROGRAMS) $(SO_pliant) $(LIB_pliant)  ## build what this machine can, say what was skipped
+EXAMPLES := $(patsubst runtime/examples/%.c,$(OUT)/examples/%,$(SRC_examples))
+
+all: $(PROGRAMS) $(EXAMPLES) $(SO_pliant) $(LIB_pliant)  ## build what this machine can, say what was skipped
 	@$(if $(strip $(SKIPPED)),echo "skipped: $(SKIPPED)",:)
 
 runtime: $(OUT)/pliant-play $(OUT)/pliant-info $(SO_pliant) $(LIB_pliant)  ## the runtime alone: a C compiler, and LAPACK for the player
@@ -155,6 +159,8 @@ $(OBJ)/precompute/%.o: precompute/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_precompute) $(PETSC_CFLAGS))
 $(OBJ)/runtime/draw/%.o: runtime/draw/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_runtime) $(PNG_CFLAGS))
+$(OBJ)/runtime/examples/%.o: runtime/examples/%.c $(FLAGS_STAMP)
+	$(call compile,$(I_examples))
 $(OBJ)/runtime/%.o: runtime/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_runtime) $(if $(HAVE_HDF5),,-DPLIANT_WITHOUT_HDF5))
 $(OBJ)/tests/precompute/%.o: tests/precompute/%.c $(FLAGS_STAMP)
@@ -200,6 +206,9 @@ $(OUT)/pliant-info: $(OBJ)/runtime/info/main.o $(LIB_info) $(LIB_pliant)
 	$(program) -lm -lpthread
 $(OUT)/pliant-draw: $(OBJ)/runtime/draw/main.o $(LIB_draw) $(LIB_play) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
+# Examples see what a user sees: the public headers and the library.
+$(OUT)/examples/%: $(OBJ)/runtime/examples/%.o $(LIB_pliant)
+	$(program) -lm -lpthread
 
 # ---- Tests, benchmarks, fuzzers ----
 
@@ -233,7 +242,7 @@ $(OUT)/tests/%: $(OBJ)/tests/%.o $(TEST_LIBS)
 	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(PNG_LIBS) $(LAPACK_LIBS) -lm -lpthread
 
 tests: $(TESTS) $(BENCHES)  ## build the tests and the benchmarks
-check: $(PROGRAMS) $(TESTS)  ## run the tests; T=pattern chooses (make check T=wavelet)
+check: $(PROGRAMS) $(EXAMPLES) $(TESTS)  ## run the tests; T=pattern chooses (make check T=wavelet)
 	@$(if $(HAVE_CMOCKA),:,echo "tests need libcmocka-dev"; exit 1)
 	@PLIANT_BUILD=$(OUT) scripts/run-tests $(TESTS)
 # The sample at RMS 5%, MAX 11%, with the default wavelets and without their update.
@@ -248,7 +257,7 @@ $(OUT)/bench/%.h5: $(OUT)/pliant-precompute
 	    mpirun --quiet -n 2 $< -q --force --rms 0.05 --max 0.11 $(WAVELET) $(SAMPLE) $(MORE) -o $@
 bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS) $(DETAIL_MODEL)  ## run the benchmarks: figures against baselines measured in the same run
 	@. scripts/environment; for b in $(BENCHES); do echo "== $${b##*/}"; \
-	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy | */bench_patch | */bench_tool) models="$(BENCH_MODELS)";; \
+	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy | */bench_patch | */bench_tool | */bench_haptic) models="$(BENCH_MODELS)";; \
 	        */bench_detail) models="$(DETAIL_MODEL)";; *) models="";; esac; \
 	    PLIANT_BUILD=$(OUT) $$b $$models || exit 1; done
 
