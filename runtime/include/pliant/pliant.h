@@ -271,7 +271,7 @@ PLIANT_CALL pliant_status pliant_detail_interpolate(const pliant_detail *detail,
 // (GF-68): where the prescribed displacements are smooth by coarse hats, elsewhere by finer ones.
 // What was chosen is kept from solve to solve, and nodes come and go smoothly. A patch need not be
 // connected. Several patches may share a solver, beside constraints and loads of the caller's own
-// on other vertices.
+// on other vertices; those on a patch's vertices may be replaced by its nodes.
 typedef struct pliant_patch pliant_patch;
 
 typedef struct pliant_patch_def {
@@ -301,9 +301,9 @@ PLIANT_CALL pliant_status pliant_patch_tolerate(pliant_patch *patch, double tole
 
 // Choose nodes, state them to the solver (which then says what pliant_solver_solve would), solve,
 // and refine until the error is within the tolerance. Everything of the solver can be read
-// afterwards. PLIANT_LATE: the deadline or the solver's room came first; the state is valid, but
-// the error (see the report) is above the tolerance. PLIANT_ROUGH as pliant_solver_solve. Does not
-// refuse.
+// afterwards. PLIANT_LATE: the deadline came first, or the solver's room or the file's levels do not
+// go as far; the state is valid, and the report tells its error. Calls go on from there.
+// PLIANT_ROUGH as pliant_solver_solve. Does not refuse.
 PLIANT_CALL pliant_status pliant_patch_solve(pliant_patch *patch, int64_t deadline);
 
 // Force that the patch exerts on the body, N: of its nodes and of those fading out.
@@ -320,7 +320,7 @@ typedef struct pliant_patch_report {
     int32_t solve_count;      // solves that this took, 1 when the last nodes were right
     int32_t blending;         // nodes that have not reached their displacement, or are fading out
     int32_t is_late;          // 1: the deadline came before the tolerance was met
-    int32_t is_full;          // 1: the solver's room did
+    int32_t is_full;          // 1: the solver's room did, or the finest nodes that the file has
     double error;             // m, largest |u - target| at the patch's vertices
 } pliant_patch_report;
 PLIANT_API pliant_patch_report pliant_patch_last(const pliant_patch *patch);
