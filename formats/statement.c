@@ -174,10 +174,9 @@ static int is_name(word w)
 static pliant_status parse_name(cursor *c, pliant_statement *s)
 {
     const word w = take(c);
-    if (!is_name(w))
-        return refuse(c, PLIANT_ERR_FORMAT, w, "a probe's name of letters, digits, _ - .");
+    if (!is_name(w)) return refuse(c, PLIANT_ERR_FORMAT, w, "a name of letters, digits, _ - .");
     if (w.length >= sizeof s->name)
-        return refuse(c, PLIANT_ERR_FORMAT, w, "a probe's name of at most 63 bytes");
+        return refuse(c, PLIANT_ERR_FORMAT, w, "a name of at most 63 bytes");
     memcpy(s->name, w.text, w.length);
     s->name[w.length] = 0;
     return PLIANT_OK;
@@ -256,6 +255,123 @@ static pliant_status parse_release(cursor *c, pliant_statement *s)
     return PLIANT_OK;
 }
 
+// A number that is above zero, or may be zero.
+static pliant_status parse_positive(cursor *c, const char *expected, double *value)
+{
+    const word w = peek(c);
+    const pliant_status status = parse_number(c, expected, value);
+    return status == PLIANT_OK && !(*value > 0) ? refuse(c, PLIANT_ERR_FORMAT, w, expected)
+                                                : status;
+}
+
+static pliant_status parse_not_negative(cursor *c, const char *expected, double *value)
+{
+    const word w = peek(c);
+    const pliant_status status = parse_number(c, expected, value);
+    return status == PLIANT_OK && *value < 0 ? refuse(c, PLIANT_ERR_FORMAT, w, expected) : status;
+}
+
+// What stands before a number.
+static pliant_status parse_label(cursor *c, const char *label)
+{
+    const word w = take(c);
+    return is_word(w, label) ? PLIANT_OK : refuse(c, PLIANT_ERR_FORMAT, w, label);
+}
+
+static pliant_status parse_patch(cursor *c, pliant_statement *s)
+{
+    pliant_status status = parse_name(c, s);
+    if (status < 0) return status;
+    if (is_word(peek(c), "tolerance")) {
+        take(c);
+        return parse_not_negative(c, "a tolerance, a number >= 0", &s->scalar);
+    }
+    if (is_word(peek(c), "release")) {
+        take(c);
+        s->kind = PLIANT_STATEMENT_PATCH_RELEASE;
+        return parse_release(c, s);
+    }
+    s->kind = PLIANT_STATEMENT_PATCH_DISPLACE;
+    return parse_load(c, s);
+}
+
+static pliant_status parse_contact(cursor *c, pliant_statement *s)
+{
+    const pliant_status status = parse_label(c, "tolerance");
+    return status < 0 ? status : parse_positive(c, "a tolerance, a number > 0", &s->scalar);
+}
+
+static pliant_status parse_sphere(cursor *c, pliant_statement *s)
+{
+    const pliant_status status = parse_vector(c, s->value);
+    return status < 0 ? status : parse_positive(c, "a radius, a number > 0", &s->scalar);
+}
+
+static pliant_status parse_plane(cursor *c, pliant_statement *s)
+{
+    const word w = peek(c);
+    const pliant_status status = parse_vector(c, s->value);
+    if (status < 0) return status;
+    if (s->value[0] == 0 && s->value[1] == 0 && s->value[2] == 0)
+        return refuse(c, PLIANT_ERR_FORMAT, w, "a normal that is not 0 0 0");
+    return parse_number(c, "the plane's distance, a number", &s->scalar);
+}
+
+static pliant_status parse_capsule(cursor *c, pliant_statement *s)
+{
+    pliant_status status = parse_vector(c, s->value);
+    if (status == PLIANT_OK) status = parse_vector(c, s->end);
+    return status < 0 ? status : parse_positive(c, "a radius, a number > 0", &s->scalar);
+}
+
+static const struct {
+    const char *word;
+    pliant_shape_kind kind;
+    pliant_status (*parse)(cursor *c, pliant_statement *s);
+} shapes[] = {
+    {"sphere", PLIANT_SHAPE_SPHERE, parse_sphere},
+    {"plane", PLIANT_SHAPE_PLANE, parse_plane},
+    {"capsule", PLIANT_SHAPE_CAPSULE, parse_capsule},
+};
+
+static pliant_status parse_friction(cursor *c, pliant_statement *s)
+{
+    if (!is_word(peek(c), "friction")) return PLIANT_OK;
+    take(c);
+    return parse_not_negative(c, "a friction coefficient, a number >= 0", &s->friction);
+}
+
+static pliant_status parse_tool(cursor *c, pliant_statement *s)
+{
+    pliant_status status = parse_name(c, s);
+    if (status < 0) return status;
+    const word w = take(c);
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        if (!is_word(w, shapes[i].word)) continue;
+        s->shape = shapes[i].kind;
+        status = shapes[i].parse(c, s);
+        return status < 0 ? status : parse_friction(c, s);
+    }
+    return refuse(c, PLIANT_ERR_FORMAT, w, "sphere, plane or capsule");
+}
+
+static pliant_status parse_proxy(cursor *c, pliant_statement *s)
+{
+    pliant_status status = parse_name(c, s);
+    if (status == PLIANT_OK) status = parse_vector(c, s->value);
+    if (status == PLIANT_OK && is_word(peek(c), "stiffness")) {
+        take(c);
+        status = parse_positive(c, "a stiffness, a number > 0", &s->stiffness);
+    }
+    return status < 0 ? status : parse_friction(c, s);
+}
+
+static pliant_status parse_move(cursor *c, pliant_statement *s)
+{
+    const pliant_status status = parse_name(c, s);
+    return status < 0 ? status : parse_vector(c, s->value);
+}
+
 static pliant_status parse_deadline(cursor *c, pliant_statement *s)
 {
     if (is_word(peek(c), "none")) {
@@ -269,11 +385,7 @@ static pliant_status parse_deadline(cursor *c, pliant_statement *s)
 
 static pliant_status parse_dt(cursor *c, pliant_statement *s)
 {
-    const word w = peek(c);
-    const pliant_status status = parse_number(c, "seconds, a number > 0", &s->scalar);
-    if (status == PLIANT_OK && s->scalar <= 0)
-        return refuse(c, PLIANT_ERR_FORMAT, w, "seconds, a number > 0");
-    return status;
+    return parse_positive(c, "seconds, a number > 0", &s->scalar);
 }
 
 static pliant_status parse_step(cursor *c, pliant_statement *s)
@@ -287,12 +399,7 @@ static pliant_status parse_expect(cursor *c, pliant_statement *s)
 {
     pliant_status status = parse_name(c, s);
     if (status == PLIANT_OK) status = parse_vector(c, s->value);
-    if (status < 0) return status;
-    const word w = peek(c);
-    status = parse_number(c, "a tolerance, a number >= 0", &s->scalar);
-    if (status == PLIANT_OK && s->scalar < 0)
-        return refuse(c, PLIANT_ERR_FORMAT, w, "a tolerance, a number >= 0");
-    return status;
+    return status < 0 ? status : parse_not_negative(c, "a tolerance, a number >= 0", &s->scalar);
 }
 
 static const struct {
@@ -308,6 +415,12 @@ static const struct {
     {"support", PLIANT_STATEMENT_SUPPORT, parse_load},
     {"gravity", PLIANT_STATEMENT_GRAVITY, parse_gravity},
     {"release", PLIANT_STATEMENT_RELEASE, parse_release},
+    {"patch", PLIANT_STATEMENT_PATCH, parse_patch},
+    {"contact", PLIANT_STATEMENT_CONTACT, parse_contact},
+    {"tool", PLIANT_STATEMENT_TOOL, parse_tool},
+    {"proxy", PLIANT_STATEMENT_PROXY, parse_proxy},
+    {"move", PLIANT_STATEMENT_MOVE, parse_move},
+    {"drop", PLIANT_STATEMENT_DROP, parse_name},
     {"deadline", PLIANT_STATEMENT_DEADLINE, parse_deadline},
     {"dt", PLIANT_STATEMENT_DT, parse_dt},
     {"step", PLIANT_STATEMENT_STEP, parse_step},
@@ -352,7 +465,8 @@ static pliant_status parse(cursor *c, int first, pliant_statement *s)
     }
     return refuse(
         c, PLIANT_ERR_FORMAT, w,
-        "probe, displace, traction, force, support, gravity, release, deadline, dt, step or expect");
+        "probe, displace, traction, force, support, gravity, release, patch, contact, tool, "
+        "proxy, move, drop, deadline, dt, step or expect");
 }
 
 pliant_status pliant_statement_parse(const char *text, size_t length, const char *name,

@@ -113,11 +113,111 @@ static void every_statement_is_understood(void **state)
     check_near(parse("gravity 0 0 1e-400").value[2], 0, 0);
 }
 
+static void patches_tools_and_proxies_are_understood(void **state)
+{
+    (void)state;
+    pliant_statement s = parse("patch thumb tolerance 1e-4");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_PATCH);
+    assert_string_equal(s.name, "thumb");
+    check_near(s.scalar, 1e-4, 0);
+    check_near(parse("patch thumb tolerance 0").scalar, 0, 0);
+    s = parse("patch thumb 812 1 2 3");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_PATCH_DISPLACE);
+    assert_int_equal(s.vertex.number, 812);
+    check_near(s.value[2], 3, 0);
+    s = parse("patch near near 1 2 3 4 5 6");  // a name may be any word
+    assert_string_equal(s.name, "near");
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_NEAR);
+    check_near(s.vertex.position[0], 1, 0);
+    check_near(s.value[0], 4, 0);
+    s = parse("patch thumb release source 5");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_PATCH_RELEASE);
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_SOURCE);
+    assert_int_equal(parse("patch thumb release all").vertex.kind, PLIANT_VERTEX_ALL);
+
+    s = parse("tool ball sphere 1 2 3 0.5");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_TOOL);
+    assert_int_equal(s.shape, PLIANT_SHAPE_SPHERE);
+    assert_string_equal(s.name, "ball");
+    check_near(s.value[1], 2, 0);
+    check_near(s.scalar, 0.5, 0);
+    check_near(s.friction, 0, 0);
+    s = parse("tool floor plane 0 0 -2 -0.1 friction 0.25");
+    assert_int_equal(s.shape, PLIANT_SHAPE_PLANE);
+    check_near(s.value[2], -2, 0);
+    check_near(s.scalar, -0.1, 0);
+    check_near(s.friction, 0.25, 0);
+    s = parse("tool rod capsule 1 2 3 4 5 6 7 friction 0");
+    assert_int_equal(s.shape, PLIANT_SHAPE_CAPSULE);
+    check_near(s.value[2], 3, 0);
+    check_near(s.end[0], 4, 0);
+    check_near(s.end[2], 6, 0);
+    check_near(s.scalar, 7, 0);
+    check_near(parse("contact tolerance 2e-4").scalar, 2e-4, 0);
+    assert_int_equal(parse("contact tolerance 2e-4").kind, PLIANT_STATEMENT_CONTACT);
+
+    s = parse("proxy pen 1 2 3");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_PROXY);
+    check_near(s.value[0], 1, 0);
+    check_near(s.stiffness, 0, 0);
+    s = parse("proxy pen 1 2 3 stiffness 800 friction 3.5");
+    check_near(s.stiffness, 800, 0);
+    check_near(s.friction, 3.5, 0);
+    check_near(parse("proxy pen 1 2 3 friction 1").friction, 1, 0);
+    s = parse("move pen -1 -2 -3");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_MOVE);
+    assert_string_equal(s.name, "pen");
+    check_near(s.value[2], -3, 0);
+    s = parse("drop pen");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_DROP);
+    assert_string_equal(s.name, "pen");
+}
+
+static void mistakes_in_patches_tools_and_proxies_are_placed_and_explained(void **state)
+{
+    (void)state;
+    check_refused("patch", "s:7:6: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("patch a/b tolerance 1", "s:7:7: expected a name of letters, digits, _ - ., found \"a/b\"");
+    check_refused("patch p", "s:7:8: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
+    check_refused("patch p tolerance", "s:7:18: expected a tolerance, a number >= 0, found the end of the line");
+    check_refused("patch p tolerance -1", "s:7:19: expected a tolerance, a number >= 0, found \"-1\"");
+    check_refused("patch p tolerance 1 2", "s:7:21: expected the end of the line, found \"2\"");
+    check_refused("patch p 12 0 0", "s:7:15: expected z, a number, found the end of the line");
+    check_refused("patch p release", "s:7:16: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
+    check_refused("patch p release all 1", "s:7:21: expected the end of the line, found \"1\"");
+    check_refused("contact", "s:7:8: expected tolerance, found the end of the line");
+    check_refused("contact friction 1", "s:7:9: expected tolerance, found \"friction\"");
+    check_refused("contact tolerance 0", "s:7:19: expected a tolerance, a number > 0, found \"0\"");
+    check_refused("tool", "s:7:5: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("tool t", "s:7:7: expected sphere, plane or capsule, found the end of the line");
+    check_refused("tool t cube 1 2 3 4", "s:7:8: expected sphere, plane or capsule, found \"cube\"");
+    check_refused("tool t sphere 1 2", "s:7:18: expected z, a number, found the end of the line");
+    check_refused("tool t sphere 1 2 3", "s:7:20: expected a radius, a number > 0, found the end of the line");
+    check_refused("tool t sphere 1 2 3 0", "s:7:21: expected a radius, a number > 0, found \"0\"");
+    check_refused("tool t sphere 1 2 3 -1e-3", "s:7:21: expected a radius, a number > 0, found \"-1e-3\"");
+    check_refused("tool t sphere 1 2 3 4 5", "s:7:23: expected the end of the line, found \"5\"");
+    check_refused("tool t sphere 1 2 3 4 friction", "s:7:31: expected a friction coefficient, a number >= 0, found the end of the line");
+    check_refused("tool t sphere 1 2 3 4 friction -1", "s:7:32: expected a friction coefficient, a number >= 0, found \"-1\"");
+    check_refused("tool t sphere 1 2 3 4 friction 1 friction 1", "s:7:34: expected the end of the line, found \"friction\"");
+    check_refused("tool t plane 0 0 0 1", "s:7:14: expected a normal that is not 0 0 0, found \"0\"");
+    check_refused("tool t plane 0 0 1", "s:7:19: expected the plane's distance, a number, found the end of the line");
+    check_refused("tool t capsule 1 2 3 4 5", "s:7:25: expected z, a number, found the end of the line");
+    check_refused("tool t capsule 1 2 3 4 5 6 0", "s:7:28: expected a radius, a number > 0, found \"0\"");
+    check_refused("proxy p 1 2", "s:7:12: expected z, a number, found the end of the line");
+    check_refused("proxy p 1 2 3 stiffness 0", "s:7:25: expected a stiffness, a number > 0, found \"0\"");
+    check_refused("proxy p 1 2 3 friction 1 stiffness 2", "s:7:26: expected the end of the line, found \"stiffness\"");
+    check_refused("move", "s:7:5: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("move p 1 2", "s:7:11: expected z, a number, found the end of the line");
+    check_refused("drop", "s:7:5: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("drop a b", "s:7:8: expected the end of the line, found \"b\"");
+}
+
 static void mistakes_are_placed_and_explained(void **state)
 {
     (void)state;
     check_refused("shove 1 2 3", "s:7:1: expected probe, displace, traction, force, support, gravity, "
-                                 "release, deadline, dt, step or expect, found \"shove\"");
+                                 "release, patch, contact, tool, proxy, move, drop, deadline, dt, step or "
+                                 "expect, found \"shove\"");
     check_refused("pliant-script 1", "s:7:1: expected pliant-script as first statement only, found \"pliant-script\"");
     check_refused("displace", "s:7:9: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
     check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"-1\"");
@@ -161,8 +261,8 @@ static void mistakes_are_placed_and_explained(void **state)
     check_refused("dt", "s:7:3: expected seconds, a number > 0, found the end of the line");
     check_refused("expect nose 0 0 0", "s:7:18: expected a tolerance, a number >= 0, found the end of the line");
     check_refused("expect nose 0 0 0 -1", "s:7:19: expected a tolerance, a number >= 0, found \"-1\"");
-    check_refused("probe", "s:7:6: expected a probe's name of letters, digits, _ - ., found the end of the line");
-    check_refused("probe a,b vertex 1", "s:7:7: expected a probe's name of letters, digits, _ - ., found \"a,b\"");
+    check_refused("probe", "s:7:6: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("probe a,b vertex 1", "s:7:7: expected a name of letters, digits, _ - ., found \"a,b\"");
     check_refused("probe nose 1:near 0 0 0", "s:7:12: expected vertex or near, found \"1:near\"");
     check_refused("probe nose 812", "s:7:12: expected vertex or near, found \"812\"");
     check_refused("probe nose vertex", "s:7:18: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
@@ -210,7 +310,7 @@ static void long_words_and_lines_are_refused_in_one_short_line(void **state)
     snprintf(line, sizeof line, "probe %.63s vertex 1", name);
     assert_int_equal(strlen(parse(line).name), 63);
     snprintf(line, sizeof line, "probe %.64s vertex 1", name);
-    check_refused(line, "s:7:7: expected a probe's name of at most 63 bytes, found \"nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn...\"");
+    check_refused(line, "s:7:7: expected a name of at most 63 bytes, found \"nnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnnn...\"");
     memset(line, '0', sizeof line);
     memcpy(line, "dt 1", 4);
     line[3] = '.';
@@ -258,6 +358,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_statement_is_understood),
+        cmocka_unit_test(patches_tools_and_proxies_are_understood),
+        cmocka_unit_test(mistakes_in_patches_tools_and_proxies_are_placed_and_explained),
         cmocka_unit_test(mistakes_are_placed_and_explained),
         cmocka_unit_test(columns_count_characters_not_bytes),
         cmocka_unit_test(first_statement_must_be_the_version),

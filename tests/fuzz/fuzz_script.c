@@ -23,6 +23,11 @@ static const char *const seeds[] = {
     "\xef\xbb\xbfpliant-script 1\nforce near 1 2 3 0 0 -3\nsupport 30 0 0 0.01\ngravity 0 0 "
     "-9.81\ndt 1e-3\n",
     "pliant-script 1\ndisplace 1:near 0 1 2 0 0 1\nprobe p vertex 0:source 7\nrelease 2:5\n",
+    "pliant-script 1\npatch thumb tolerance 1e-4\npatch thumb 12 0 0 -1\npatch thumb release all\ndrop "
+    "thumb\n",
+    "pliant-script 1\ncontact tolerance 1e-3\ntool a sphere 1 2 3 4 friction 0.5\nmove a 1 2 2\n"
+    "tool b plane 0 0 1 -2\ntool c capsule 1 2 3 4 5 6 7\n",
+    "pliant-script 1\nproxy pen 1 2 3 stiffness 100 friction 1\nstep\n",
     "pliant-script 1\ndeadline 200\nstep\ndeadline none\n",
     "pliant-script 1\nrelease 812\nrelease all\nexpect nose 0 0 -0.02 1e-3\n\n# \xc3\xa4\n",
     "pliant-script 2\n",
@@ -49,7 +54,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 static void check_statement(const pliant_statement *s)
 {
     for (int d = 0; d < 3; d++)
-        if (!isfinite(s->value[d]) || !isfinite(s->vertex.position[d])) abort();
+        if (!isfinite(s->value[d]) || !isfinite(s->end[d]) || !isfinite(s->vertex.position[d]))
+            abort();
     if (!isfinite(s->scalar) || s->column < 1 || s->vertex.number < 0 || s->vertex.level < 0)
         abort();
     if (!s->vertex.has_level && s->vertex.level != 0) abort();
@@ -58,6 +64,12 @@ static void check_statement(const pliant_statement *s)
         abort();
     if (s->kind == PLIANT_STATEMENT_DEADLINE && (s->count < -1 || s->count > 1000000000)) abort();
     if (s->kind == PLIANT_STATEMENT_DT && !(s->scalar > 0)) abort();
+    if (!(s->friction >= 0) || !(s->stiffness >= 0) || !isfinite(s->friction + s->stiffness)) abort();
+    if ((s->kind == PLIANT_STATEMENT_TOOL) != (s->shape != PLIANT_SHAPE_NONE)) abort();
+    if (s->shape == PLIANT_SHAPE_PLANE && s->value[0] == 0 && s->value[1] == 0 && s->value[2] == 0)
+        abort();
+    if ((s->shape == PLIANT_SHAPE_SPHERE || s->shape == PLIANT_SHAPE_CAPSULE) && !(s->scalar > 0))
+        abort();
 }
 
 // One line by itself; the statement's kind, or its refusal.

@@ -9,24 +9,32 @@
 #include <stddef.h>
 
 #define PLIANT_SCRIPT_VERSION        1
-#define PLIANT_SCRIPT_NAME_LIMIT     64          // bytes of a probe's name, with its end
+#define PLIANT_SCRIPT_NAME_LIMIT     64          // bytes of a name, with its end
 #define PLIANT_SCRIPT_LINE_LIMIT     4096        // bytes of a line
 #define PLIANT_SCRIPT_DEADLINE_LIMIT 1000000000  // microseconds
 
 typedef enum pliant_statement_kind {
-    PLIANT_STATEMENT_NONE,      // blank or comment
-    PLIANT_STATEMENT_VERSION,   // pliant-script 1
-    PLIANT_STATEMENT_PROBE,     // probe NAME vertex VERTEX | probe NAME near X Y Z
-    PLIANT_STATEMENT_DISPLACE,  // displace VERTEX X Y Z
-    PLIANT_STATEMENT_TRACTION,  // traction VERTEX X Y Z
-    PLIANT_STATEMENT_FORCE,     // force VERTEX X Y Z
-    PLIANT_STATEMENT_SUPPORT,   // support VERTEX X Y Z
-    PLIANT_STATEMENT_GRAVITY,   // gravity X Y Z
-    PLIANT_STATEMENT_RELEASE,   // release VERTEX | release all
-    PLIANT_STATEMENT_DEADLINE,  // deadline MICROSECONDS | deadline none
-    PLIANT_STATEMENT_DT,        // dt SECONDS
-    PLIANT_STATEMENT_STEP,      // step [COUNT]
-    PLIANT_STATEMENT_EXPECT,    // expect NAME X Y Z TOLERANCE
+    PLIANT_STATEMENT_NONE,            // blank or comment
+    PLIANT_STATEMENT_VERSION,         // pliant-script 1
+    PLIANT_STATEMENT_PROBE,           // probe NAME vertex VERTEX | probe NAME near X Y Z
+    PLIANT_STATEMENT_DISPLACE,        // displace VERTEX X Y Z
+    PLIANT_STATEMENT_TRACTION,        // traction VERTEX X Y Z
+    PLIANT_STATEMENT_FORCE,           // force VERTEX X Y Z
+    PLIANT_STATEMENT_SUPPORT,         // support VERTEX X Y Z
+    PLIANT_STATEMENT_GRAVITY,         // gravity X Y Z
+    PLIANT_STATEMENT_RELEASE,         // release VERTEX | release all
+    PLIANT_STATEMENT_PATCH,           // patch NAME tolerance T
+    PLIANT_STATEMENT_PATCH_DISPLACE,  // patch NAME VERTEX X Y Z
+    PLIANT_STATEMENT_PATCH_RELEASE,   // patch NAME release VERTEX | patch NAME release all
+    PLIANT_STATEMENT_CONTACT,         // contact tolerance T
+    PLIANT_STATEMENT_TOOL,            // tool NAME SHAPE [friction MU]
+    PLIANT_STATEMENT_PROXY,           // proxy NAME X Y Z [stiffness K] [friction MU]
+    PLIANT_STATEMENT_MOVE,            // move NAME X Y Z
+    PLIANT_STATEMENT_DROP,            // drop NAME
+    PLIANT_STATEMENT_DEADLINE,        // deadline MICROSECONDS | deadline none
+    PLIANT_STATEMENT_DT,              // dt SECONDS
+    PLIANT_STATEMENT_STEP,            // step [COUNT]
+    PLIANT_STATEMENT_EXPECT,          // expect NAME X Y Z TOLERANCE
 } pliant_statement_kind;
 
 typedef enum pliant_vertex_kind {
@@ -46,15 +54,26 @@ typedef struct pliant_vertex_name {
     double position[3];
 } pliant_vertex_name;
 
+// SHAPE of a tool; what it fills of a statement: value, scalar, end.
+typedef enum pliant_shape_kind {
+    PLIANT_SHAPE_NONE,
+    PLIANT_SHAPE_SPHERE,   // sphere X Y Z R: centre, radius
+    PLIANT_SHAPE_PLANE,    // plane NX NY NZ D: normal, not 0; the body's side is n.x >= D
+    PLIANT_SHAPE_CAPSULE,  // capsule X Y Z X Y Z R: one end, the other (in `end`), radius
+} pliant_shape_kind;
+
 typedef struct pliant_statement {
     pliant_statement_kind kind;
-    int64_t line;                // 1-based
-    int32_t column;              // 1-based, of the statement's first argument (for later messages)
+    int64_t line;    // 1-based
+    int32_t column;  // 1-based, of the statement's first argument (for later messages)
     char name[PLIANT_SCRIPT_NAME_LIMIT];
     pliant_vertex_name vertex;
-    double value[3];             // finite
-    double scalar;               // tolerance of expect, seconds of dt; finite
-    int64_t count;               // of step; version of pliant-script; microseconds, -1: none
+    double value[3];  // finite
+    double scalar;    // tolerance, seconds of dt, R or D of a shape; finite
+    int64_t count;    // of step; version of pliant-script; microseconds, -1: none
+    pliant_shape_kind shape;
+    double end[3];
+    double friction, stiffness;  // 0: not stated
 } pliant_statement;
 
 typedef struct pliant_script pliant_script;  // an open script: a stream, its name and line number
@@ -65,8 +84,8 @@ PLIANT_UNUSED_RESULT pliant_status pliant_script_open(const char *path, pliant_s
 void pliant_script_close(pliant_script *script);
 
 // Read on to the next statement that is not blank. *more is 0 at the end of the script. Refusals
-// read "name:line:column: expected ..., found ..." and leave the parser at the next line, with *more
-// 1; when the stream itself fails, the status is PLIANT_ERR_IO and *more 0.
+// read "name:line:column: expected ..., found ..." and leave the parser at the next line, with
+// *more 1; when the stream itself fails, the status is PLIANT_ERR_IO and *more 0.
 PLIANT_UNUSED_RESULT pliant_status pliant_script_next(pliant_script *script,
                                                       pliant_statement *statement, int *more,
                                                       pliant_error *err);
