@@ -15,31 +15,43 @@ typedef struct recorder {
     int complete;  // 1: every state is there; the rest of the script need not be played
 } recorder;
 
+// A contact on a vertex finer than the level drawn has no place in the picture.
+static void put_mark(const pliant_recording *recording, struct pliant_recorded_state *state,
+                     int32_t vertex, pliant_vec3 v)
+{
+    if (vertex >= recording->vertex_count) return;
+    state->marks[state->mark_count++] =
+        (pliant_mark){.vertex = vertex, .direction = {(double)v.x, (double)v.y, (double)v.z}};
+}
+
 static pliant_status keep(recorder *r, pliant_player *player, int64_t step, pliant_error *err)
 {
     pliant_recording *recording = r->recording;
     struct pliant_recorded_state *state = &recording->states[recording->count];
     int32_t condition_count = 0;
     const pliant_condition *conditions = pliant_player_conditions(player, &condition_count);
+    const pliant_props *props = pliant_player_props(player);
+    const int32_t touched_count = pliant_props_marks(props, NULL, 0);
+    pliant_prop_mark *touched = malloc(((size_t)touched_count + 1) * sizeof *touched);
     state->displacement =
         malloc(((size_t)recording->vertex_count + 1) * sizeof *state->displacement);
-    state->marks = malloc(((size_t)condition_count + 1) * sizeof *state->marks);
+    state->marks = malloc(((size_t)condition_count + (size_t)touched_count + 1) *
+                          sizeof *state->marks);
     recording->count++;  // destroy frees what was allocated
-    if (!state->displacement || !state->marks)
+    if (!state->displacement || !state->marks || !touched) {
+        free(touched);
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for step %lld", (long long)step);
+    }
     state->step = step;
     memcpy(state->displacement, pliant_player_surface(player),
            (size_t)recording->vertex_count * sizeof *state->displacement);
     state->mark_count = 0;
-    for (int32_t i = 0; i < condition_count; i++) {
-        // A contact on a vertex finer than the level drawn has no place in the picture.
-        if (conditions[i].node.vertex >= recording->vertex_count) continue;
-        const pliant_vec3 v = conditions[i].value;
-        state->marks[state->mark_count++] = (pliant_mark){
-            .vertex = conditions[i].node.vertex,
-            .direction = {(double)v.x, (double)v.y, (double)v.z},
-        };
-    }
+    for (int32_t i = 0; i < condition_count; i++)
+        put_mark(recording, state, conditions[i].node.vertex, conditions[i].value);
+    (void)pliant_props_marks(props, touched, touched_count);
+    for (int32_t i = 0; i < touched_count; i++)
+        put_mark(recording, state, touched[i].vertex, touched[i].direction);
+    free(touched);
     if (recording->count == r->wanted_count) r->complete = 1;
     return PLIANT_OK;
 }

@@ -12,7 +12,9 @@ typedef struct pliant_recording {
     struct pliant_recorded_state {
         int64_t step;               // 0: at rest
         pliant_vec3 *displacement;  // shape [vertex_count]; owned
-        pliant_mark *marks;  // shape [mark_count]: nodes not in their reference condition; owned
+        // Nodes not in their reference condition, and where patches, tools and proxies act; shape
+        // [mark_count]; owned.
+        pliant_mark *marks;
         int32_t mark_count;
     } * states;  // shape [count]; owned
 } pliant_recording;

@@ -14,6 +14,9 @@ struct pliant_conditions {
     pliant_vec3 gravity;
     int32_t *slot;  // [n] 1 + the place in list of a vertex; 0 in the reference condition
     int32_t vertex_count;
+    int32_t spare_constraints, spare_loads;  // what others have asked for
+    pliant_conditions_follower follower;     // may be NULL
+    void *follower_context;
 };
 
 typedef enum growth {
@@ -70,6 +73,30 @@ static pliant_status apply(pliant_solver *solver, const pliant_condition *condit
     return PLIANT_ERR_ARGUMENT;
 }
 
+// Replace the solver by one of this definition with the same state; on failure the old one stays.
+static pliant_status replace(pliant_conditions *conditions, const pliant_solver_def *def,
+                             pliant_error *err)
+{
+    pliant_solver *solver = NULL;
+    pliant_status status = pliant_solver_create(conditions->model, def, &solver, err);
+    if (status < 0) return status;
+    const pliant_vec3 g = conditions->gravity;
+    if (g.x != 0 || g.y != 0 || g.z != 0) status = pliant_solver_gravity(solver, g);
+    for (int32_t i = 0; status >= 0 && i < conditions->count; i++)
+        status = apply(solver, &conditions->list[i]);
+    if (status >= 0 && conditions->follower)
+        status = conditions->follower(conditions->follower_context, solver);
+    if (status < 0) {
+        pliant_solver_destroy(solver);
+        return pliant_error_set(err, status, "the state of a script on a larger solver: %s",
+                                pliant_status_name(status));
+    }
+    pliant_solver_destroy(conditions->solver);
+    conditions->solver = solver;
+    conditions->solver_def = *def;
+    return PLIANT_OK;
+}
+
 // Twice a capacity, at most one place per vertex. Returns 0 when it was that already.
 static int enlarge(int32_t *capacity, int32_t limit)
 {
@@ -78,7 +105,6 @@ static int enlarge(int32_t *capacity, int32_t limit)
     return 1;
 }
 
-// Replace the solver by one with more room and the same state; on failure the old one stays.
 static pliant_status grow(pliant_conditions *conditions, growth what)
 {
     pliant_solver_def def = conditions->solver_def;
@@ -86,23 +112,23 @@ static pliant_status grow(pliant_conditions *conditions, growth what)
     if (what & GROW_CONSTRAINTS)
         grown |= enlarge(&def.constraint_capacity, conditions->vertex_count);
     if (what & GROW_LOADS) grown |= enlarge(&def.load_capacity, conditions->vertex_count);
-    if (!grown) return PLIANT_ERR_CAPACITY;
+    return grown ? replace(conditions, &def, NULL) : PLIANT_ERR_CAPACITY;
+}
 
-    pliant_solver *solver = NULL;
-    pliant_status status = pliant_solver_create(conditions->model, &def, &solver, NULL);
-    const pliant_vec3 g = conditions->gravity;
-    if (status >= 0 && (g.x != 0 || g.y != 0 || g.z != 0))
-        status = pliant_solver_gravity(solver, g);
-    for (int32_t i = 0; status >= 0 && i < conditions->count; i++)
-        status = apply(solver, &conditions->list[i]);
-    if (status < 0) {
-        pliant_solver_destroy(solver);
-        return status;
-    }
-    pliant_solver_destroy(conditions->solver);
-    conditions->solver = solver;
-    conditions->solver_def = def;
-    return PLIANT_OK;
+// Capacities by doubling until there is room for so many conditions and what others asked for.
+static pliant_status reserve(pliant_conditions *conditions, int32_t count,
+                             pliant_compliance compliance, pliant_error *err)
+{
+    pliant_solver_def def = conditions->solver_def;
+    const int32_t n = conditions->vertex_count;
+    int grown = compliance != def.compliance;
+    def.compliance = compliance;
+    while (def.constraint_capacity < n &&
+           def.constraint_capacity - count < conditions->spare_constraints)
+        grown |= enlarge(&def.constraint_capacity, n);
+    while (def.load_capacity < n && def.load_capacity - count < conditions->spare_loads)
+        grown |= enlarge(&def.load_capacity, n);
+    return grown ? replace(conditions, &def, err) : PLIANT_OK;
 }
 
 static growth growth_for(const pliant_conditions *conditions, const pliant_condition *condition)
@@ -119,7 +145,12 @@ pliant_status pliant_conditions_set(pliant_conditions *conditions,
                                     const pliant_condition *condition)
 {
     int32_t *slot = &conditions->slot[condition->node.vertex];
-    pliant_status status = apply(conditions->solver, condition);
+    pliant_status status = PLIANT_OK;
+    // A condition is a constraint, a load or both: there is room for either.
+    if (*slot == 0 && conditions->spare_constraints + conditions->spare_loads > 0)
+        status =
+            reserve(conditions, conditions->count + 1, conditions->solver_def.compliance, NULL);
+    if (status >= 0) status = apply(conditions->solver, condition);
     while (status == PLIANT_ERR_CAPACITY) {
         status = grow(conditions, growth_for(conditions, condition));
         if (status < 0) return status;
@@ -163,7 +194,39 @@ void pliant_conditions_drop_all(pliant_conditions *conditions)
     conditions->gravity = (pliant_vec3){0, 0, 0};
 }
 
+// ---- Others ----
+
+pliant_status pliant_conditions_require(pliant_conditions *conditions, pliant_compliance compliance,
+                                        int32_t constraints, int32_t loads, pliant_error *err)
+{
+    const int32_t had_constraints = conditions->spare_constraints;
+    const int32_t had_loads = conditions->spare_loads;
+    // Passive stays passive.
+    if (conditions->solver_def.compliance == PLIANT_COMPLIANCE_PASSIVE)
+        compliance = PLIANT_COMPLIANCE_PASSIVE;
+    if (constraints > had_constraints) conditions->spare_constraints = constraints;
+    if (loads > had_loads) conditions->spare_loads = loads;
+    const pliant_status status = reserve(conditions, conditions->count, compliance, err);
+    if (status < 0) {
+        conditions->spare_constraints = had_constraints;
+        conditions->spare_loads = had_loads;
+    }
+    return status;
+}
+
+void pliant_conditions_follow(pliant_conditions *conditions, pliant_conditions_follower follower,
+                              void *context)
+{
+    conditions->follower = follower;
+    conditions->follower_context = context;
+}
+
 // ---- What can be read ----
+
+int pliant_conditions_has(const pliant_conditions *conditions, int32_t vertex)
+{
+    return conditions->slot[vertex] > 0;
+}
 
 const pliant_condition *pliant_conditions_list(const pliant_conditions *conditions, int32_t *count)
 {

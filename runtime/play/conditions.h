@@ -42,5 +42,19 @@ void pliant_conditions_drop_all(pliant_conditions *conditions);  // gravity too
 // In no particular order; borrowed until the next change.
 const pliant_condition *pliant_conditions_list(const pliant_conditions *conditions, int32_t *count);
 pliant_vec3 pliant_conditions_gravity(const pliant_conditions *conditions);
-// Has room for all conditions. Borrowed until the next change; change it through this file only.
+int pliant_conditions_has(const pliant_conditions *conditions, int32_t vertex);  // 1: has one
+// Has room for all conditions. Borrowed until the next change; change conditions through this file
+// only.
 pliant_solver *pliant_conditions_solver(const pliant_conditions *conditions);
+
+// Room in the solver beyond the conditions, for others that act on it, from now on; and passive
+// compliance, if that is asked for, for good. May replace the solver.
+PLIANT_UNUSED_RESULT pliant_status pliant_conditions_require(pliant_conditions *conditions,
+                                                             pliant_compliance compliance,
+                                                             int32_t constraints, int32_t loads,
+                                                             pliant_error *err);
+// Who else acts on the solver: called with the one that takes over, which holds the conditions,
+// while the old one is there still. A refusal keeps the old one. NULL: nobody.
+typedef pliant_status (*pliant_conditions_follower)(void *context, pliant_solver *solver);
+void pliant_conditions_follow(pliant_conditions *conditions, pliant_conditions_follower follower,
+                              void *context);

@@ -65,6 +65,7 @@ static pliant_status play(const pliant_play_options *options, const pliant_model
     def.player.level = level;
     if (options->deadline_us >= 0) def.player.deadline_ns = (int64_t)options->deadline_us * 1000;
     if (options->passive) def.player.compliance = PLIANT_COMPLIANCE_PASSIVE;
+    if (options->compare) def.player.prop_rule = PLIANT_PROPS_REFUSED;
     if (options->csv || (options->json && is_streaming))
         def.player.probe_rule = PLIANT_PROBES_FIRST;
 

@@ -2,6 +2,7 @@
 #include "player.h"
 
 #include "address.h"
+#include "prop_statement.h"
 
 #include "pliant/error.h"
 
@@ -18,6 +19,7 @@ struct pliant_player {
     int32_t finest;  // L
 
     pliant_conditions *conditions;
+    pliant_props *props;
 
     pliant_vec3 *surface;  // [surface_count]
     int32_t surface_count;
@@ -108,6 +110,7 @@ pliant_player_def pliant_player_default(const pliant_model *model)
         .script_name = "script",
         .level = pliant_model_describe(model).level_count - 1,
         .probe_rule = PLIANT_PROBES_ANYTIME,
+        .prop_rule = PLIANT_PROPS_ALLOWED,
         .deadline_ns = PLIANT_NEVER,
         .compliance = PLIANT_COMPLIANCE_STORED,
     };
@@ -136,6 +139,7 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
                                   (int)info.vertex_count);
     if (status == PLIANT_OK)
         status = pliant_conditions_create(model, def->compliance, &p->conditions, err);
+    if (status >= 0) status = pliant_props_create(model, p->conditions, &p->props, err);
     if (status < 0) {
         pliant_player_destroy(p);
         return status;
@@ -147,6 +151,7 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
 void pliant_player_destroy(pliant_player *player)
 {
     if (!player) return;
+    pliant_props_destroy(player->props);
     pliant_conditions_destroy(player->conditions);
     free(player->probe_u);
     free(player->probe_vertex);
@@ -191,6 +196,11 @@ static pliant_status execute_condition(pliant_player *player, const pliant_state
     pliant_status status = resolve(player, statement, PLIANT_ADDRESS_NODE, &condition.node, err);
     if (status < 0) return status;
     const int32_t vertex = condition.node.vertex;
+    const pliant_prop *owner = pliant_props_owner(player->props, vertex);
+    if (owner)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "vertex %d belongs to patch %s: \"patch %s release %d\" first", (int)vertex,
+                      owner->name, owner->name, (int)vertex);
     const int is_free = pliant_model_is_free(player->model, vertex) == 1;
     double scale = 1;
     switch (statement->kind) {
@@ -239,6 +249,7 @@ static pliant_status execute_release(pliant_player *player, const pliant_stateme
                                      pliant_error *err)
 {
     if (statement->vertex.kind == PLIANT_VERTEX_ALL) {
+        pliant_props_drop_all(player->props);
         pliant_conditions_drop_all(player->conditions);
         return PLIANT_OK;
     }
@@ -247,6 +258,19 @@ static pliant_status execute_release(pliant_player *player, const pliant_stateme
     if (status < 0) return status;
     status = pliant_conditions_drop(player->conditions, node.vertex);
     return status < 0 ? explain(player, statement, node, status, err) : PLIANT_OK;
+}
+
+static pliant_status execute_prop(pliant_player *player, const pliant_statement *statement,
+                                  pliant_error *err)
+{
+    if (player->def.prop_rule == PLIANT_PROPS_REFUSED)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "--compare knows conditions and gravity only: expected no patches, tools or "
+                      "proxies");
+    pliant_error reason = {""};
+    const pliant_status status =
+        pliant_prop_statement_execute(player->props, player->model, statement, &reason);
+    return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
 }
 
 static const pliant_probe *find_probe(const pliant_player *player, const char *name)
@@ -369,13 +393,25 @@ static pliant_status read_probes(pliant_player *player)
     return PLIANT_OK;
 }
 
+// The finest level that anything was solved on: of constraints and of the nodes that tools push. The
+// solver's own is the finest there is when it has no constraints.
+static int32_t level_of(const pliant_solver_report *solver, const pliant_props_report *props)
+{
+    if (props->finest_level < 0) return solver->level;
+    if (solver->constraint_count == 0 || props->finest_level > solver->level)
+        return props->finest_level;
+    return solver->level;
+}
+
 static pliant_status step_once(pliant_player *player, const pliant_statement *statement,
                                pliant_error *err)
 {
-    pliant_solver *solver = pliant_conditions_solver(player->conditions);
     const int64_t start = pliant_clock_ns(), given = player->deadline_ns;
-    const pliant_status solved =
-        pliant_solver_solve(solver, given < PLIANT_NEVER - start ? start + given : PLIANT_NEVER);
+    const int64_t deadline = given < PLIANT_NEVER - start ? start + given : PLIANT_NEVER;
+    pliant_props_report props;
+    const pliant_status solved = pliant_props_solve(player->props, deadline, &props);
+    const int64_t solved_at = pliant_clock_ns();
+    pliant_solver *solver = pliant_conditions_solver(player->conditions);
     pliant_status status = solved;
     if (solved >= 0) status = pliant_solver_surface(solver, player->def.level, player->surface);
     const int64_t end = pliant_clock_ns();
@@ -385,6 +421,13 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
                       (int)pliant_solver_constraint_count(solver),
                       status == PLIANT_ERR_SINGULAR ? "they contradict each other (singular)"
                                                     : pliant_status_name(status));
+    pliant_solver_report report = pliant_solver_last(solver);
+    report.level = level_of(&report, &props);
+    report.is_late |= props.is_late;
+    // Several solves may be in time one by one, and what is between them not.
+    if (solved_at - deadline > report.lateness_ns && !pliant_props_is_empty(player->props))
+        report.lateness_ns = solved_at - deadline;
+    const pliant_vec3 force = pliant_solver_contact_force(solver);
     player->dt_steps++;
     player->last = (pliant_step){
         .number = player->last.number + 1,
@@ -392,8 +435,8 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
         .deadline_ns = given,
         .status = solved,
         .total_ns = end - start,
-        .report = pliant_solver_last(solver),
-        .force = pliant_solver_contact_force(solver),
+        .report = report,
+        .force = {force.x + props.force.x, force.y + props.force.y, force.z + props.force.z},
     };
     status = read_probes(player);
     if (status < 0)
@@ -439,6 +482,15 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
         return execute_gravity(player, statement, err);
     case PLIANT_STATEMENT_RELEASE:
         return execute_release(player, statement, err);
+    case PLIANT_STATEMENT_PATCH:
+    case PLIANT_STATEMENT_PATCH_DISPLACE:
+    case PLIANT_STATEMENT_PATCH_RELEASE:
+    case PLIANT_STATEMENT_CONTACT:
+    case PLIANT_STATEMENT_TOOL:
+    case PLIANT_STATEMENT_PROXY:
+    case PLIANT_STATEMENT_MOVE:
+    case PLIANT_STATEMENT_DROP:
+        return execute_prop(player, statement, err);
     case PLIANT_STATEMENT_DEADLINE:
         pliant_player_set_deadline(player,
                                    statement->count < 0 ? PLIANT_NEVER : 1000 * statement->count);
@@ -514,6 +566,11 @@ const pliant_condition *pliant_player_conditions(const pliant_player *player, in
 pliant_vec3 pliant_player_gravity(const pliant_player *player)
 {
     return pliant_conditions_gravity(player->conditions);
+}
+
+const pliant_props *pliant_player_props(const pliant_player *player)
+{
+    return player->props;
 }
 
 pliant_solver *pliant_player_solver(pliant_player *player)

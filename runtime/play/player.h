@@ -1,13 +1,14 @@
 // player.h: executes the statements of a contact script against one solver.
 //
 // A player owns a solver on a borrowed model, keeps the state that the script has set (conditions,
-// gravity, probes, time), and at every step solves and reconstructs the surface. It prints and
+// gravity, patches, tools, proxies, probes, time), and at every step solves and reconstructs the surface. It prints and
 // writes nothing: an observer is told what happened. The solver's capacities follow the script: a
 // script that needs more makes the player create a larger solver and hand it the state. Otherwise
-// only create and the declaration of a probe allocate.
+// only create and the declaration of a probe, patch, tool or proxy allocate.
 #pragma once
 
 #include "conditions.h"
+#include "props.h"
 
 #include "pliant/pliant.h"
 #include "pliant/script.h"
@@ -21,12 +22,18 @@ typedef enum pliant_probe_rule {
     PLIANT_PROBES_FIRST,    // all before the first step: rows of a table have one width
 } pliant_probe_rule;
 
+typedef enum pliant_prop_rule {
+    PLIANT_PROPS_ALLOWED,
+    PLIANT_PROPS_REFUSED,  // patches, tools and proxies are (--compare: they have no dense solution)
+} pliant_prop_rule;
+
 typedef struct pliant_player_def {
     const char *script_name;       // for messages; borrowed until destroy
     int32_t level;                 // the surface is reconstructed up to this level; default all
     pliant_probe_rule probe_rule;  // default anytime
+    pliant_prop_rule prop_rule;    // default allowed
     int64_t deadline_ns;           // what a solve is given at first; default PLIANT_NEVER
-    pliant_compliance compliance;  // default as stored
+    pliant_compliance compliance;  // default as stored, until the first tool or proxy
 } pliant_player_def;
 
 typedef struct pliant_probe {
@@ -43,8 +50,9 @@ typedef struct pliant_step {
     int64_t deadline_ns;   // what the solve was given, or PLIANT_NEVER
     pliant_status status;  // of the solve: PLIANT_OK or a reduced result (the report tells more)
     int64_t total_ns;      // solve and surface together
+    // Of the step's last solve of the solver; but level, is_late and lateness_ns are of all.
     pliant_solver_report report;
-    pliant_vec3 force;  // total contact force, N
+    pliant_vec3 force;  // total contact force, of patches, tools and proxies too, N
 } pliant_step;
 
 typedef struct pliant_expectation {
@@ -100,5 +108,6 @@ const pliant_probe *pliant_player_probes(const pliant_player *player, int32_t *c
 // In no particular order; borrowed until the next statement.
 const pliant_condition *pliant_player_conditions(const pliant_player *player, int32_t *count);
 pliant_vec3 pliant_player_gravity(const pliant_player *player);
+const pliant_props *pliant_player_props(const pliant_player *player);  // to read
 // For what the player does not keep (tractions, say); borrowed until the next statement.
 pliant_solver *pliant_player_solver(pliant_player *player);

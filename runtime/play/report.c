@@ -34,13 +34,56 @@ static void write_deadline(const pliant_report *report, FILE *stream)
     fprintf(stream, "\n");
 }
 
+// What a prop did besides its force: how many nodes carry it, or whether it touches; and what its
+// `error` is.
+static void write_prop(const pliant_prop *prop, FILE *stream)
+{
+    switch (prop->kind) {
+    case PLIANT_PROP_PATCH:
+        fprintf(stream, "nodes %d error %.3g", (int)prop->node_count, prop->error);
+        break;
+    case PLIANT_PROP_TOOL:
+        fprintf(stream, "nodes %d penetration %.3g", (int)prop->node_count, prop->error);
+        break;
+    case PLIANT_PROP_PROXY:
+        fprintf(stream, "contact %d depth %.3g", (int)prop->node_count, prop->error);
+        break;
+    }
+}
+
+static void write_props(const pliant_player *player, int width, FILE *stream)
+{
+    int32_t count;
+    const pliant_prop *list = pliant_props_list(pliant_player_props(player), &count);
+    for (int32_t i = 0; i < count; i++) {
+        const pliant_prop *prop = &list[i];
+        if (!prop->is_present) continue;
+        const pliant_vec3 f = prop->force;
+        fprintf(stream, "%-*s %8s %13.6g %13.6g %13.6g  ", width, prop->name,
+                pliant_prop_kind_name(prop->kind), (double)f.x, (double)f.y, (double)f.z);
+        write_prop(prop, stream);
+        fputc('\n', stream);
+    }
+}
+
+static int widest_name(const pliant_player *player)
+{
+    size_t width = strlen("contact force");
+    int32_t count;
+    const pliant_probe *probes = pliant_player_probes(player, &count);
+    for (int32_t i = 0; i < count; i++)
+        if (strlen(probes[i].name) > width) width = strlen(probes[i].name);
+    const pliant_prop *list = pliant_props_list(pliant_player_props(player), &count);
+    for (int32_t i = 0; i < count; i++)
+        if (list[i].is_present && strlen(list[i].name) > width) width = strlen(list[i].name);
+    return (int)width;
+}
+
 static void write_probes(const pliant_player *player, FILE *stream)
 {
     int32_t count;
     const pliant_probe *probes = pliant_player_probes(player, &count);
-    int width = (int)strlen("contact force");
-    for (int32_t i = 0; i < count; i++)
-        if ((int)strlen(probes[i].name) > width) width = (int)strlen(probes[i].name);
+    const int width = widest_name(player);
     fprintf(stream, "%-*s %8s %13s %13s %13s\n", width, "last step", "vertex", "x", "y", "z");
     for (int32_t i = 0; i < count; i++) {
         fprintf(stream, "%-*s %8d ", width, probes[i].name, (int)probes[i].vertex);
@@ -53,6 +96,7 @@ static void write_probes(const pliant_player *player, FILE *stream)
     const pliant_vec3 f = pliant_player_last(player)->force;
     fprintf(stream, "%-*s %8s %13.6g %13.6g %13.6g\n", width, "contact force", "", (double)f.x,
             (double)f.y, (double)f.z);
+    write_props(player, width, stream);
 }
 
 void pliant_report_write_compare(const pliant_compare_summary *compare, FILE *stream)
@@ -117,6 +161,14 @@ void pliant_report_write_step(const pliant_player *player, const pliant_step *st
                 (double)probes[i].u.y, (double)probes[i].u.z);
     fprintf(stream, " force %.6g %.6g %.6g", (double)step->force.x, (double)step->force.y,
             (double)step->force.z);
+    const pliant_prop *list = pliant_props_list(pliant_player_props(player), &count);
+    for (int32_t i = 0; i < count; i++) {
+        if (!list[i].is_present) continue;
+        const pliant_vec3 f = list[i].force;
+        fprintf(stream, " %s %s %.6g %.6g %.6g ", pliant_prop_kind_name(list[i].kind), list[i].name,
+                (double)f.x, (double)f.y, (double)f.z);
+        write_prop(&list[i], stream);
+    }
     if (step->report.is_late || step->report.lateness_ns > 0)
         fprintf(stream, " late %.1f", 1e-3 * (double)step->report.lateness_ns);
     fprintf(stream, "\n");

@@ -88,6 +88,41 @@ static void put_compare(const pliant_compare_summary *compare, FILE *stream)
     fputc('}', stream);
 }
 
+// ,"patches":{...},"tools":{...},"proxies":{...}: of those that are there, each by name.
+static void put_props(const pliant_player *player, FILE *stream)
+{
+    static const struct {
+        pliant_prop_kind kind;
+        const char *name, *error;
+    } groups[] = {
+        {PLIANT_PROP_PATCH, "patches", "error"},
+        {PLIANT_PROP_TOOL, "tools", "penetration"},
+        {PLIANT_PROP_PROXY, "proxies", "depth"},
+    };
+    int32_t count;
+    const pliant_prop *list = pliant_props_list(pliant_player_props(player), &count);
+    for (size_t g = 0; g < sizeof groups / sizeof *groups; g++) {
+        int is_any = 0;
+        for (int32_t i = 0; i < count; i++) {
+            const pliant_prop *prop = &list[i];
+            if (!prop->is_present || prop->kind != groups[g].kind) continue;
+            if (is_any) fputc(',', stream);
+            else fprintf(stream, ",\"%s\":{", groups[g].name);
+            is_any = 1;
+            put_text(prop->name, stream);
+            fputs(":{\"force\":", stream);
+            put_vec3(prop->force, stream);
+            if (prop->kind == PLIANT_PROP_PROXY)
+                fprintf(stream, ",\"contact\":%s", prop->node_count ? "true" : "false");
+            else fprintf(stream, ",\"nodes\":%d", (int)prop->node_count);
+            fprintf(stream, ",\"%s\":", groups[g].error);
+            put_number(prop->error, stream);
+            fputc('}', stream);
+        }
+        if (is_any) fputc('}', stream);
+    }
+}
+
 void pliant_report_write_json(const pliant_report *report, FILE *stream)
 {
     const pliant_crew_result *result = report->result;
@@ -126,6 +161,7 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
     }
     fputs("},\"force\":", stream);
     put_vec3(pliant_player_last(player)->force, stream);
+    put_props(player, stream);
     put_punctuality(report, stream);
     if (report->compare) {
         fputs(",\"compare\":", stream);
@@ -159,6 +195,7 @@ void pliant_report_write_step_json(const pliant_player *player, const pliant_ste
     }
     fputs("},\"force\":", stream);
     put_vec3(step->force, stream);
+    put_props(player, stream);
     fputs("}\n", stream);
 }
 
