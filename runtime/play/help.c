@@ -72,7 +72,8 @@ static const char language[] =
     "  force VERTEX X Y Z            force; traction = force / area of the vertex's hat\n"
     "  support VERTEX X Y Z          displacement of a fixed vertex\n"
     "  gravity X Y Z                 acceleration\n"
-    "  release VERTEX | release all  back to the reference condition; all: gravity too\n"
+    "  release VERTEX | release all  back to the reference condition; all: gravity, too, and\n"
+    "                                what is named below is dropped\n"
     "  deadline US | deadline none   what a solve is given from here on, in place of\n"
     "                                --deadline-us\n"
     "  dt SECONDS                    time that a step takes, 0.001 at the start\n"
@@ -92,4 +93,31 @@ static const char ending[] =
     "      pliant-play bunny.h5\n"
     "  pliant-play -o poke.csv --vtk poke bunny.h5 poke.script\n";
 
-const char *const pliant_play_help[] = {options, notes, language, ending, NULL};
+static const char props[] =
+    "Contact that finds its own nodes and levels. What has a NAME stays until it is\n"
+    "dropped; a step solves it all, patches first, then tools, then proxies, each kind on\n"
+    "the surface that those before have shaped. Its forces count in the total contact\n"
+    "force. Per step and at the end, --json has `patches` (force, nodes, error), `tools`\n"
+    "(force, nodes, penetration) and `proxies` (force, contact, depth).\n"
+    "\n"
+    "  patch NAME tolerance T        a patch: its vertices are displaced as stated, to T\n"
+    "  patch NAME VERTEX X Y Z       (0: exactly), with as few nodes of mixed levels as\n"
+    "  patch NAME release VERTEX     do. A vertex belongs to one patch, or has a condition\n"
+    "  patch NAME release all        of its own\n"
+    "  tool NAME sphere X Y Z R      a rigid tool, that pushes and never pulls: centre,\n"
+    "  tool NAME plane NX NY NZ D    radius; the body stays where N.x >= D; two ends and\n"
+    "  tool NAME capsule X Y Z X Y Z R   a radius. Said again, the tool moves there. Up\n"
+    "                                to 8 at once\n"
+    "    ... friction MU             Coulomb's coefficient, 0 to 2; none without\n"
+    "  contact tolerance T           how far the surface may enter tools, before the first\n"
+    "  proxy NAME X Y Z [stiffness K] [friction MU]   a device's point, there, on a spring\n"
+    "  move NAME X Y Z               tool: its centre, a point of the plane, its first end\n"
+    "                                (rigidly); proxy: its device\n"
+    "  drop NAME                     take it away\n"
+    "\n"
+    "The first tool or proxy makes contact --passive for good. --compare refuses scripts\n"
+    "with patches, tools or proxies. Levels come and go over some 16 steps: give a contact\n"
+    "as many to settle.\n"
+    "\n";
+
+const char *const pliant_play_help[] = {options, notes, language, props, ending, NULL};

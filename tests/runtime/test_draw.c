@@ -769,6 +769,43 @@ static void recorded_states_are_those_of_their_steps(void **state)
     drop_stage(&s);
 }
 
+static void recorded_tools_and_patches_have_marks(void **state)
+{
+    (void)state;
+    const stage s = make_stage("pliant-script 1\n"
+                               "tool ball sphere 0 0 1.25 0.3\n"
+                               "step\n"
+                               "patch thumb tolerance 1e-3\n"
+                               "patch thumb near 1 0 0 -0.1 0 0\n"
+                               "step\n"
+                               "drop ball\n"
+                               "step\n");
+    pliant_model *model = NULL;
+    pliant_error err = {""};
+    check_ok(pliant_model_open(s.model, &model, &err), &err);
+    const int32_t side = pliant_model_nearest(model, (const double[3]){1, 0, 0});
+    const double *x = pliant_model_positions(model);
+    const int64_t steps[] = {1, 2, 3};
+    pliant_recording *recording = NULL;
+    check_ok(pliant_recording_create(model, 2, s.script, steps, 3, &recording, &err), &err);
+    const int32_t touched = recording->states[0].mark_count;
+    check_at_least(touched, 1);
+    for (int32_t i = 0; i < touched; i++) {
+        const pliant_mark *mark = &recording->states[0].marks[i];
+        check_at_least(x[3 * mark->vertex + 2], 0.8);  // at the top, under the ball
+        check_at_most(mark->direction[2], 0);
+    }
+    assert_int_equal(recording->states[1].mark_count, touched + 1);
+    assert_int_equal(recording->states[2].mark_count, 1);
+    assert_int_equal(recording->states[2].marks[0].vertex, side);
+    check_near(recording->states[2].marks[0].direction[0], -0.1, 1e-6);
+    // Where they are.
+    check_near((double)recording->states[2].displacement[side].x, -0.1, 2e-3);
+    pliant_recording_destroy(recording);
+    pliant_model_close(model);
+    drop_stage(&s);
+}
+
 // Pixels of columns [x0, x1) above the legend that differ from the picture's corner.
 static int count_drawn(const uint8_t *rgb, int32_t width, int32_t height, int32_t x0, int32_t x1)
 {
@@ -963,6 +1000,7 @@ int main(void)
         cmocka_unit_test(options_mean_what_the_help_says),
         cmocka_unit_test(bad_options_are_refused_by_name),
         cmocka_unit_test(recorded_states_are_those_of_their_steps),
+        cmocka_unit_test(recorded_tools_and_patches_have_marks),
         cmocka_unit_test(picture_of_a_step_has_the_rest_shape_beside_it),
         cmocka_unit_test(coarse_levels_and_single_panels_are_drawn),
         cmocka_unit_test(detailed_surfaces_are_drawn_over_any_level),

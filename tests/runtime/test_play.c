@@ -800,6 +800,101 @@ static void comparison_with_the_dense_file_is_float_accurate(void **state)
     check_contains(err, "free-dense.h5:/dense/nodes: expected the model's");
 }
 
+// A script with one of each: the ball 0.05 deep in the top of the unit sphere.
+static const char touch[] = "pliant-script 1\n"
+                            "probe side near 1 0 0\n"
+                            "patch thumb tolerance 1e-3\n"
+                            "patch thumb near 1 0 0 -0.02 0 0\n"
+                            "tool ball sphere 0 0 1.25 0.3\n"
+                            "proxy pen 0 -0.9 0\n"
+                            "step 3\n"
+                            "expect side -0.02 0 0 1e-3\n";
+
+static void patches_tools_and_proxies_are_reported(void **state)
+{
+    (void)state;
+    double ball[3], thumb[3], pen[3], total[3], penetration, error, depth;
+    int nodes, step, touching;
+    write_text("touch.script", touch);
+    check_run(0, "$P -o touch.csv model.h5 touch.script");
+    const char *row = strstr(out, "\nball ");
+    assert_non_null(row);
+    assert_int_equal(sscanf(row, " ball tool %lf %lf %lf nodes %d penetration %lf", &ball[0],
+                            &ball[1], &ball[2], &nodes, &penetration),
+                     5);
+    check_at_least(nodes, 1);
+    check_at_most(ball[2], -1e-3);
+    assert_int_equal(sscanf(strstr(out, "\nthumb "), " thumb patch %lf %lf %lf nodes %d error %lf",
+                            &thumb[0], &thumb[1], &thumb[2], &nodes, &error),
+                     5);
+    assert_int_equal(nodes, 1);
+    check_at_most(error, 1e-3);
+    assert_int_equal(sscanf(strstr(out, "\npen "), " pen proxy %lf %lf %lf contact %d depth %lf",
+                            &pen[0], &pen[1], &pen[2], &touching, &depth),
+                     5);
+    assert_int_equal(touching, 1);
+    // The device is 0.1 under the surface at rest, which has given way.
+    check_at_least(depth, 1e-3);
+    check_at_most(depth, 0.1 + 1e-3);
+    assert_int_equal(sscanf(strstr(out, "\ncontact force"), " contact force %lf %lf %lf", &total[0],
+                            &total[1], &total[2]),
+                     3);
+    // Printed to six digits.
+    for (int c = 0; c < 3; c++) check_near(total[c], ball[c] + thumb[c] + pen[c], 1e-4);
+    // The file of rows has its promised columns, the last three of which are that sum.
+    read_text("touch.csv", out);
+    assert_int_equal(strncmp(out,
+                             "step,time,solve_us,constraints,level,side.x,side.y,side.z,"
+                             "force.x,force.y,force.z\n1,",
+                             78),
+                     0);
+    double found[3];
+    const char *last = strstr(out, "\n3,");
+    assert_non_null(last);
+    for (int c = 0; c < 8; c++) last = strchr(last + 1, ',');
+    assert_int_equal(sscanf(last, ",%lf,%lf,%lf", &found[0], &found[1], &found[2]), 3);
+    for (int c = 0; c < 3; c++) check_near(found[c], total[c], 1e-5);
+
+    check_run(0, "$P model.h5 - <touch.script");
+    row = strstr(out, "step 3 ");
+    assert_non_null(row);
+    assert_int_equal(sscanf(strstr(row, " patch thumb"),
+                            " patch thumb %lf %lf %lf nodes 1 error %lf tool ball %lf %lf %lf nodes "
+                            "%d penetration %lf proxy pen %lf %lf %lf contact %d",
+                            &found[0], &found[0], &found[0], &error, &found[0], &found[1],
+                            &found[2], &nodes, &penetration, &pen[0], &pen[1], &pen[2], &touching),
+                     13);
+    for (int c = 0; c < 3; c++) check_near(found[c], ball[c], 1e-5);
+
+    for (int k = 0; k < 2; k++) {
+        check_run(0, k ? "$P --json model.h5 - <touch.script" : "$P --json model.h5 touch.script");
+        check_contains(out, "],\"patches\":{\"thumb\":{\"force\":[");
+        check_contains(out, "],\"nodes\":1,\"error\":");
+        row = strstr(out, "}},\"tools\":{\"ball\":{\"force\":[");
+        assert_non_null(row);
+        assert_int_equal(sscanf(strchr(row, '['), "[%lf,%lf,%lf],\"nodes\":%d,\"penetration\":%lf",
+                                &found[0], &found[1], &found[2], &step, &penetration),
+                         5);
+        if (k == 0)
+            for (int c = 0; c < 3; c++) check_near(found[c], ball[c], 1e-5);
+        check_contains(out, "}},\"proxies\":{\"pen\":{\"force\":[");
+        check_contains(out, "],\"contact\":true,\"depth\":");
+    }
+    // Without any, nothing is said of them.
+    check_run(0, "$P --json model.h5 poke.script");
+    assert_null(strstr(out, "\"tools\""));
+}
+
+static void contact_without_a_dense_solution_is_not_compared(void **state)
+{
+    (void)state;
+    write_text("touch.script", touch);
+    check_run(1, "$P --compare dense.h5 model.h5 touch.script");
+    assert_string_equal(err, "pliant-play: touch.script:3:7: --compare knows conditions and gravity "
+                             "only: expected no patches, tools or proxies\n");
+    assert_string_equal(out, "");
+}
+
 static void repeats_and_threads_play_the_same_and_count_all(void **state)
 {
     (void)state;
@@ -975,6 +1070,8 @@ int main(void)
         cmocka_unit_test(vtk_series_opens),
         cmocka_unit_test(detailed_surfaces_are_those_of_the_library),
         cmocka_unit_test(comparison_with_the_dense_file_is_float_accurate),
+        cmocka_unit_test(patches_tools_and_proxies_are_reported),
+        cmocka_unit_test(contact_without_a_dense_solution_is_not_compared),
         cmocka_unit_test(repeats_and_threads_play_the_same_and_count_all),
         cmocka_unit_test(missed_deadlines_are_told_and_are_no_failure),
         cmocka_unit_test(passive_contact_is_never_rough),
