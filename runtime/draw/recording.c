@@ -35,8 +35,8 @@ static pliant_status keep(recorder *r, pliant_player *player, int64_t step, plia
     pliant_prop_mark *touched = malloc(((size_t)touched_count + 1) * sizeof *touched);
     state->displacement =
         malloc(((size_t)recording->vertex_count + 1) * sizeof *state->displacement);
-    state->marks = malloc(((size_t)condition_count + (size_t)touched_count + 1) *
-                          sizeof *state->marks);
+    state->marks =
+        malloc(((size_t)condition_count + (size_t)touched_count + 1) * sizeof *state->marks);
     recording->count++;  // destroy frees what was allocated
     if (!state->displacement || !state->marks || !touched) {
         free(touched);

@@ -393,8 +393,8 @@ static pliant_status read_probes(pliant_player *player)
     return PLIANT_OK;
 }
 
-// The finest level that anything was solved on: of constraints and of the nodes that tools push. The
-// solver's own is the finest there is when it has no constraints.
+// The finest level that anything was solved on: of constraints and of the nodes that tools push.
+// The solver's own is the finest there is when it has no constraints.
 static int32_t level_of(const pliant_solver_report *solver, const pliant_props_report *props)
 {
     if (props->finest_level < 0) return solver->level;

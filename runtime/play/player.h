@@ -1,10 +1,10 @@
 // player.h: executes the statements of a contact script against one solver.
 //
 // A player owns a solver on a borrowed model, keeps the state that the script has set (conditions,
-// gravity, patches, tools, proxies, probes, time), and at every step solves and reconstructs the surface. It prints and
-// writes nothing: an observer is told what happened. The solver's capacities follow the script: a
-// script that needs more makes the player create a larger solver and hand it the state. Otherwise
-// only create and the declaration of a probe, patch, tool or proxy allocate.
+// gravity, patches, tools, proxies, probes, time), and at every step solves and reconstructs the
+// surface. It prints and writes nothing: an observer is told what happened. The solver's capacities
+// follow the script: a script that needs more makes the player create a larger solver and hand it
+// the state. Otherwise only create and the declaration of a probe, patch, tool or proxy allocate.
 #pragma once
 
 #include "conditions.h"
@@ -24,7 +24,7 @@ typedef enum pliant_probe_rule {
 
 typedef enum pliant_prop_rule {
     PLIANT_PROPS_ALLOWED,
-    PLIANT_PROPS_REFUSED,  // patches, tools and proxies are (--compare: they have no dense solution)
+    PLIANT_PROPS_REFUSED,  // --compare: patches, tools and proxies have no dense solution
 } pliant_prop_rule;
 
 typedef struct pliant_player_def {

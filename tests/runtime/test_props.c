@@ -1,4 +1,5 @@
-// test_props.c: patches, tools and proxies of scripts: what is solved, reported, moved over, refused.
+// test_props.c: patches, tools and proxies of scripts: what is solved, reported, moved over,
+// refused.
 #include "allocations.h"
 #include "check.h"
 
@@ -97,8 +98,7 @@ static void check_vec3(pliant_vec3 found, pliant_vec3 expected, double tolerance
     check_near(found.z, expected.z, tolerance);
 }
 
-static void check_whole(const pliant_player *player, const pliant_vec3 *expected,
-                          double tolerance)
+static void check_whole(const pliant_player *player, const pliant_vec3 *expected, double tolerance)
 {
     double worst = 0;
     for (int32_t v = 0; v < pliant_player_surface_count(player); v++) {
@@ -192,8 +192,8 @@ static void a_tool_is_solved_as_the_library_solves_it(void **state)
 {
     (void)state;
     static pliant_vec3 expected[642];
-    const pliant_tool ball = {.kind = PLIANT_TOOL_SPHERE, .a = {0.125f, 0, 1.25f}, .radius = 0.3125f,
-                              .friction = 0.5f};
+    const pliant_tool ball = {
+        .kind = PLIANT_TOOL_SPHERE, .a = {0.125f, 0, 1.25f}, .radius = 0.3125f, .friction = 0.5f};
     pliant_error err;
     pliant_solver *solver = passive_solver();
     pliant_contact *contact = NULL;
@@ -385,7 +385,8 @@ static void moving_a_tool_is_declaring_it_elsewhere(void **state)
          "tool t sphere 0.0625 0.125 1.1875 0.3125\n"},
         {"tool t capsule -0.5 0 1.125 0.5 0 1.25 0.25\n", "move t -0.375 0.125 1.125\n",
          "tool t capsule -0.375 0.125 1.125 0.625 0.125 1.25 0.25\n"},
-        {"tool t plane 0 0 -2 -1.96875\n", "move t 0.25 0.5 0.9375\n", "tool t plane 0 0 -2 -1.875\n"},
+        {"tool t plane 0 0 -2 -1.96875\n", "move t 0.25 0.5 0.9375\n",
+         "tool t plane 0 0 -2 -1.875\n"},
     };
     for (size_t k = 0; k < sizeof tools / sizeof *tools; k++) {
         pliant_player *moved = create(), *declared = create();
@@ -535,9 +536,12 @@ static void steps_with_all_kinds_do_not_allocate(void **state)
     if (!COUNTING) skip();
     pliant_player *player = create();
     play_ok(player, "%sstep\n", mixture);
-    static const char *const lines[] = {"move ball 0.05 0 1.22",     "move pen 0.1 -0.9 0",
-                                        "patch side near 1 0 0 -0.03 0 0", "step 5",
-                                        "move ball -0.05 0 1.25",    "patch side near 1 0 0 0.01 0 0",
+    static const char *const lines[] = {"move ball 0.05 0 1.22",
+                                        "move pen 0.1 -0.9 0",
+                                        "patch side near 1 0 0 -0.03 0 0",
+                                        "step 5",
+                                        "move ball -0.05 0 1.25",
+                                        "patch side near 1 0 0 0.01 0 0",
                                         "step 5"};
     enum { LINES = sizeof lines / sizeof *lines };
     pliant_statement statements[LINES];
