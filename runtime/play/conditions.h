@@ -2,8 +2,9 @@
 //
 // A pliant_solver has fixed capacities; a script has none. This keeps every vertex that is not in
 // its reference condition, on the level that the last statement about it named, so that when the
-// solver runs out of room a larger one is created and handed the state. Nothing else allocates
-// after create.
+// solver runs out of room a larger one is created and handed the state. Others may act on the
+// solver beside the conditions: they ask for room, and follow when it is replaced. Nothing else
+// allocates after create.
 #pragma once
 
 #include "pliant/pliant.h"
