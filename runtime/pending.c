@@ -96,8 +96,10 @@ void pliant_pending_advance(const pliant_model *model, const pliant_node *nodes,
         pending->stage != PLIANT_PENDING_NONE && pending->type.shift == scratch->held_shift &&
         pliant_capacitance_matches(&pending->type, nodes, count);
     if (!is_same) {
+        // A set that is gone with the next solve is not worth its time.
         begin(nodes, count, pending);
         pending->type.shift = scratch->held_shift;
+        return;
     }
     int64_t worked = worked_ns();
     while (is_busy(pending)) {

@@ -32,8 +32,8 @@ typedef struct pliant_pending {
 void pliant_pending_lay_out(pliant_arena *arena, const pliant_model *model, int32_t capacity,
                             pliant_pending *pending);
 
-// Go on with the type of `nodes` (ascending), from the beginning if the last call was for others,
-// until it is whole or `deadline` is near.
+// Go on with the type of `nodes` (ascending) until it is whole or `deadline` is near. When the last
+// call was for others this one is only noted: sets of a contact that moves are not begun.
 void pliant_pending_advance(const pliant_model *model, const pliant_node *nodes, int32_t count,
                             int64_t deadline, pliant_capacitance_scratch *scratch,
                             pliant_pending *pending);

@@ -11,6 +11,8 @@
 // A step must be predicted to end this much of its length before the deadline: predictions of an
 // undisturbed machine are within a fifth (bench_haptic).
 static const double margin = 1.25;
+// Of the time that a late solve has left, this part stays unused.
+enum { reserve = 4 };
 
 // How one set's type would be had.
 typedef struct plan {
@@ -198,7 +200,10 @@ void pliant_solver_prepare(pliant_solver *solver, int64_t deadline)
     const int32_t count = solver->constraint_count;
     for (int32_t i = 0; i < count; i++) solver->key[i] = solver->constraints[i].node;
     pliant_pending *pending = &solver->pending;
-    pliant_pending_advance(solver->model, solver->key, count, deadline, &solver->scratch, pending);
+    // A part of what is left is kept for slices that take longer than expected.
+    const int64_t now = pliant_clock_ns();
+    const int64_t end = deadline > now ? deadline - (deadline - now) / reserve : deadline;
+    pliant_pending_advance(solver->model, solver->key, count, end, &solver->scratch, pending);
     solver->report.prepared = (float)pliant_pending_part(pending);
     if (pending->stage != PLIANT_PENDING_WHOLE) return;
     // It takes a place among the types; where the only one is in use, it is found where it is.
