@@ -1,4 +1,5 @@
-// compliance.c: the contact compliance of one level as a symmetric operator, and how definite it is.
+// compliance.c: the contact compliance of one level as a symmetric operator, and how definite it
+// is.
 #include "pliant/compliance.h"
 
 #include "pliant/arena.h"
@@ -17,23 +18,27 @@ enum {
 // which then counts as one of the largest: as the runtime's capacitance does.
 static const double least_diagonal = 0x1p-20;
 
-// What the eigenvalues are known to; the diagonal is 1. A tenth of it takes twice as many steps where
-// the small ones are crowded (357 and 727 on a smooth body of 2562 vertices) and changes 1e-4.
+// What the eigenvalues are known to; the diagonal is 1. A tenth of it takes twice as many steps
+// where the small ones are crowded (357 and 727 on a smooth body of 2562 vertices) and changes
+// 1e-4.
 static const double tolerance = 1e-3;
 // Measured: 50 to 510 steps do for blocks of 2562 and 9920 vertices.
 static const int32_t step_capacity = 6000;
 
-typedef struct operator {
+typedef struct operator
+{
     pliant_compliance_def def;
     int32_t rows, columns;  // positions of the row domain; hats of the level
     pliant_arena arena;
     double *scale;  // [columns][3]: D^-1/2
-    double *gather; // [rows + 1][3] coefficients, then [columns][3] of the transpose: added up at once
-    double *spread; // [rows + 1][3]
-    double *group;  // [rows + 1][entries][group]
-} operator;
+    double *
+        gather;  // [rows + 1][3] coefficients, then [columns][3] of the transpose: added up at once
+    double *spread;  // [rows + 1][3]
+    double *group;   // [rows + 1][entries][group]
+}
+operator;
 
-static void lay_out(operator *o)
+static void lay_out(operator* o)
 {
     const size_t rows = (size_t)o->rows + 1;
     PLIANT_TAKE(&o->arena, o->scale, 3 * (size_t)o->columns);
@@ -47,13 +52,13 @@ static int32_t column_of(const pliant_compliance_columns *c, int32_t i)
     return c->column ? c->column[i] : i;
 }
 
-static void add_up(const operator *o, double *values, int32_t count)
+static void add_up(const operator* o, double *values, int32_t count)
 {
     if (o->def.sum) o->def.sum(o->def.context, values, count);
 }
 
 // The diagonal of A G, and from it the scale.
-static void find_scale(operator *o)
+static void find_scale(operator* o)
 {
     const pliant_compliance_columns *c = &o->def.columns;
     const double *area = o->def.hats->area[o->def.level];
@@ -81,11 +86,11 @@ static void find_scale(operator *o)
     }
 }
 
-// y = M x. A G s is the sum of columns, transformed back, at the level's own vertices; its transpose
-// goes the other way round.
+// y = M x. A G s is the sum of columns, transformed back, at the level's own vertices; its
+// transpose goes the other way round.
 static void apply(void *context, double *x, double *y)
 {
-    operator *o = context;
+    operator* o = context;
     const pliant_compliance_columns *c = &o->def.columns;
     const pliant_wavelet *w = o->def.wavelet;
     const double *area = o->def.hats->area[o->def.level];
@@ -121,15 +126,19 @@ static void apply(void *context, double *x, double *y)
 pliant_status pliant_compliance_eigenvalues(const pliant_compliance_def *def,
                                             pliant_lanczos_result *result, pliant_error *err)
 {
-    operator o = {.def = *def, .rows = def->wavelet->count,
+    operator o = {.def = *def,
+                  .rows = def->wavelet->count,
                   .columns = def->hats->level_offset[def->level + 1]};
     lay_out(&o);
     pliant_status status = pliant_arena_reserve(&o.arena, err);
     if (status < 0) return status;
     lay_out(&o);
     find_scale(&o);
-    const pliant_lanczos_def lanczos = {.n = 3 * o.columns, .apply = apply, .context = &o,
-                                        .tolerance = tolerance, .step_capacity = step_capacity};
+    const pliant_lanczos_def lanczos = {.n = 3 * o.columns,
+                                        .apply = apply,
+                                        .context = &o,
+                                        .tolerance = tolerance,
+                                        .step_capacity = step_capacity};
     status = pliant_lanczos_extremes(&lanczos, result, err);
     pliant_arena_release(&o.arena);
     return status;

@@ -65,7 +65,8 @@ static int32_t spread(const pliant_wavelet *w, int32_t level, reach *reaches)
 {
     const int32_t columns = w->level_offset[level + 1];
     int32_t entries = columns;
-    for (int32_t p = 0; p < columns; p++) reaches[p] = (reach){.count = 1, .hat = {p}, .weight = {1}};
+    for (int32_t p = 0; p < columns; p++)
+        reaches[p] = (reach){.count = 1, .hat = {p}, .weight = {1}};
     for (int32_t p = columns; p < w->count; p++) {
         const int32_t *parents = w->update_node + 2 * (size_t)(p - w->level_offset[1]);
         reaches[p].count = 0;

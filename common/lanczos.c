@@ -1,8 +1,8 @@
 // lanczos.c: the smallest and the largest eigenvalue of a symmetric operator known by what it does.
 //
 // This follows: C. Lanczos, J. Res. Nat. Bur. Standards 45, 1950; C. C. Paige, Accuracy and
-// effectiveness of the Lanczos algorithm, Linear Algebra Appl. 34, 1980; J. Cullum and R. Willoughby,
-// Lanczos Algorithms, Birkhaeuser, 1985.
+// effectiveness of the Lanczos algorithm, Linear Algebra Appl. 34, 1980; J. Cullum and R.
+// Willoughby, Lanczos Algorithms, Birkhaeuser, 1985.
 #include "pliant/lanczos.h"
 
 #include "pliant/arena.h"
@@ -21,7 +21,7 @@ static const double rounding = 8 * DBL_EPSILON;
 typedef struct work {
     pliant_arena arena;
     double *previous, *current, *image, *spare;  // [n]
-    double *diagonal, *side;  // [step_capacity]: T; side[i] couples i and i + 1
+    double *diagonal, *side;                     // [step_capacity]: T; side[i] couples i and i + 1
 } work;
 
 static void lay_out(const pliant_lanczos_def *def, work *w)
@@ -64,7 +64,8 @@ static void start(int32_t n, double *x)
 //
 // Largest eigenvalues are the smallest of -T, so all that follows looks at sign T.
 
-// How many eigenvalues of sign T are under `bound`: negative pivots of sign T - bound I (Sylvester).
+// How many eigenvalues of sign T are under `bound`: negative pivots of sign T - bound I
+// (Sylvester).
 static int32_t count_below(const work *w, int32_t k, double sign, double bound)
 {
     int32_t count = 0;
@@ -83,7 +84,8 @@ static double smallest_of(const work *w, int32_t k, double sign)
 {
     double low = INFINITY, high = INFINITY;
     for (int32_t i = 0; i < k; i++) {
-        const double radius = (i > 0 ? fabs(w->side[i - 1]) : 0) + (i + 1 < k ? fabs(w->side[i]) : 0);
+        const double radius =
+            (i > 0 ? fabs(w->side[i - 1]) : 0) + (i + 1 < k ? fabs(w->side[i]) : 0);
         low = fmin(low, sign * w->diagonal[i] - radius);
         high = fmin(high, sign * w->diagonal[i]);  // Rayleigh's quotient of a unit vector
     }
@@ -98,9 +100,9 @@ static double smallest_of(const work *w, int32_t k, double sign)
 }
 
 // The smallest residual that T knows for `value`. With x_i = 1 and the others backwards from
-// x_{h-1} = - side_{h-1} / pivot_{h-1} x_h, the pivots being those of T - value I, the first i basis
-// vectors make a vector whose residual is (pivot_i^2 + side_i^2)^1/2 over the norm of x. Any i will do;
-// the best one counts, since behind it there may be unfinished copies.
+// x_{h-1} = - side_{h-1} / pivot_{h-1} x_h, the pivots being those of T - value I, the first i
+// basis vectors make a vector whose residual is (pivot_i^2 + side_i^2)^1/2 over the norm of x. Any
+// i will do; the best one counts, since behind it there may be unfinished copies.
 static double residual_of(const work *w, int32_t k, double value)
 {
     double square = 1, pivot = 1, best = INFINITY;  // of x's norm
@@ -128,7 +130,8 @@ pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanc
 {
     if (def->n < 1 || def->step_capacity < 1)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "eigenvalues: expected an operator of at least one row, found %d", (int)def->n);
+                                "eigenvalues: expected an operator of at least one row, found %d",
+                                (int)def->n);
     work w = {.arena = {0}};
     lay_out(def, &w);
     pliant_status status = pliant_arena_reserve(&w.arena, err);
@@ -149,7 +152,8 @@ pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanc
         w.diagonal[k] = diagonal;
         w.side[k] = side;
         if (!isfinite(diagonal) || !isfinite(side)) {
-            status = pliant_error_set(err, PLIANT_ERR_ARGUMENT, "eigenvalues: expected finite numbers, found others");
+            status = pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                      "eigenvalues: expected finite numbers, found others");
             break;
         }
         // A vanishing rest: the vectors so far span all that the start leans on.
@@ -157,7 +161,9 @@ pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def, pliant_lanc
         const int is_done = side <= rounding * size || k + 1 == def->step_capacity;
         if (is_done || k + 1 >= next_look) {
             look(&w, k + 1, result);
-            if (is_done || fmax(result->smallest_residual, result->largest_residual) <= def->tolerance) break;
+            if (is_done ||
+                fmax(result->smallest_residual, result->largest_residual) <= def->tolerance)
+                break;
             next_look += 1 + next_look / looks_per_doubling;
         }
         double *oldest = w.previous;

@@ -66,11 +66,9 @@ static double invert3(const double *m, double *inverse)
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++) {
             const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-            inverse[3 * c + r] =
-                m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
+            inverse[3 * c + r] = m[3 * r1 + c1] * m[3 * r2 + c2] - m[3 * r1 + c2] * m[3 * r2 + c1];
         }
-    const double determinant =
-        m[0] * inverse[0] + m[1] * inverse[3] + m[2] * inverse[6];
+    const double determinant = m[0] * inverse[0] + m[1] * inverse[3] + m[2] * inverse[6];
     for (int e = 0; e < 9; e++) inverse[e] /= determinant;
     return determinant;
 }
@@ -92,8 +90,8 @@ static double least_pivot_of(const double *m)
 }
 
 int32_t pliant_bordering_append(size_t n, size_t stride, double *inverse, const double *columns,
-                           const double *rows, const double *corner, double least_pivot,
-                           double *work)
+                                const double *rows, const double *corner, double least_pivot,
+                                double *work)
 {
     const size_t old_rows = pliant_dense_stride(n);
     double *f = work, *h = work + 3 * old_rows, *t = work + 6 * old_rows;
@@ -148,7 +146,8 @@ void pliant_bordering_move_last(size_t n, size_t stride, double *matrix, size_t 
         for (size_t r = 0; r < 3; r++) matrix[last + r + j * stride] = 0;
 }
 
-int32_t pliant_bordering_remove(size_t n, size_t stride, double *inverse, size_t first, double *work)
+int32_t pliant_bordering_remove(size_t n, size_t stride, double *inverse, size_t first,
+                                double *work)
 {
     const size_t rows = pliant_dense_stride(n);
     double *f = work, *t = work + 3 * rows, block[9], inverted[9];

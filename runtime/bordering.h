@@ -21,6 +21,7 @@ int32_t pliant_bordering_append(size_t n, size_t stride, double *inverse, const 
                                 double *work);
 // Remove rows and columns first .. first + 2 from `inverse`, of n rows; the last three take their
 // place. 0 when the block there is singular: nothing was changed.
-int32_t pliant_bordering_remove(size_t n, size_t stride, double *inverse, size_t first, double *work);
+int32_t pliant_bordering_remove(size_t n, size_t stride, double *inverse, size_t first,
+                                double *work);
 // Move the last three rows and columns of a matrix to first .. first + 2, and clear them.
 void pliant_bordering_move_last(size_t n, size_t stride, double *matrix, size_t first);

@@ -91,9 +91,8 @@ static int32_t list_domain(const pliant_model *model, const pliant_node *nodes,
 
 // Plan the values of these members; slot[member] tells where they will be.
 static void plan_members(const pliant_model *model, const pliant_node *nodes,
-                         const int32_t *members, int32_t count,
-                         pliant_capacitance_scratch *scratch, pliant_reconstruction *plan,
-                         int32_t *slot)
+                         const int32_t *members, int32_t count, pliant_capacitance_scratch *scratch,
+                         pliant_reconstruction *plan, int32_t *slot)
 {
     for (int32_t d = 0; d < pliant_capacitance_domain_count(model); d++) {
         const int32_t listed = list_domain(model, nodes, members, count, d, scratch->index);
@@ -218,11 +217,11 @@ static void set_scale(const pliant_model *model, pliant_capacitance *type, int32
     }
 }
 
-// How far to believe the element (i, j) of the passive M, and (j, i) for the rest. Compression leaves a
-// column with an error in proportion to its peak, which is near its own node: weighted by areas that
-// is A_i G_jj for (i, j), and the weights are those of least variance. A stiff part's column tells
-// how a thin part follows it; the thin part's, whose errors are as large as the stiff part's
-// displacements, does not. Of nodes on two levels the finer one's row is taken.
+// How far to believe the element (i, j) of the passive M, and (j, i) for the rest. Compression
+// leaves a column with an error in proportion to its peak, which is near its own node: weighted by
+// areas that is A_i G_jj for (i, j), and the weights are those of least variance. A stiff part's
+// column tells how a thin part follows it; the thin part's, whose errors are as large as the stiff
+// part's displacements, does not. Of nodes on two levels the finer one's row is taken.
 static double trust(const pliant_capacitance *type, int32_t i, int32_t j, double area,
                     double other_area)
 {
@@ -268,10 +267,10 @@ static void weigh_pair(const pliant_model *model, const pliant_capacitance_scrat
 
 // ---- Inversion ----
 
-// Is the symmetric part of M + shift I positive definite? Of a stored M only the parts within levels
-// are looked at: between levels not even exact elements are reciprocal, since the value at a coarse
-// vertex is not the mean under its hat, and a third of random mixed sets of an exact matrix would
-// look indefinite. Uses work_matrix.
+// Is the symmetric part of M + shift I positive definite? Of a stored M only the parts within
+// levels are looked at: between levels not even exact elements are reciprocal, since the value at a
+// coarse vertex is not the mean under its hat, and a third of random mixed sets of an exact matrix
+// would look indefinite. Uses work_matrix.
 static int32_t is_definite(const pliant_capacitance *type, double shift,
                            pliant_capacitance_scratch *scratch)
 {
@@ -283,10 +282,9 @@ static int32_t is_definite(const pliant_capacitance *type, double shift,
             const int32_t counts = is_passive || type->nodes[i].level == type->nodes[j].level;
             for (size_t c = 3 * j; c < 3 * j + 3; c++)
                 for (size_t r = 3 * i; r < 3 * i + 3; r++)
-                    half[r + c * leading] = counts ? (type->matrix[r + c * leading] +
-                                                      type->matrix[c + r * leading]) /
-                                                         2
-                                                   : 0;
+                    half[r + c * leading] =
+                        counts ? (type->matrix[r + c * leading] + type->matrix[c + r * leading]) / 2
+                               : 0;
         }
     for (size_t k = 0; k < 3 * count; k++) half[k + k * leading] += shift;
     clear_tail(3 * count, 3 * count, leading, half);
@@ -431,8 +429,7 @@ void pliant_capacitance_set_scales(const pliant_model *model, pliant_capacitance
 }
 
 void pliant_capacitance_weigh_columns(const pliant_model *model, int32_t begin, int32_t end,
-                                      pliant_capacitance_scratch *scratch,
-                                      pliant_capacitance *type)
+                                      pliant_capacitance_scratch *scratch, pliant_capacitance *type)
 {
     for (int32_t j = begin; j < end; j++)
         for (int32_t i = 0; i <= j; i++) weigh_pair(model, scratch, type, i, j);
@@ -486,8 +483,7 @@ pliant_capacitance_difference pliant_capacitance_compare(const pliant_capacitanc
     return (pliant_capacitance_difference){type->count - common, count - common};
 }
 
-void pliant_capacitance_copy(const pliant_capacitance *from,
-                             pliant_capacitance *to)
+void pliant_capacitance_copy(const pliant_capacitance *from, pliant_capacitance *to)
 {
     const size_t count = (size_t)from->count, n = 3 * count;
     memcpy(to->nodes, from->nodes, count * sizeof *to->nodes);

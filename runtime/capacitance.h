@@ -24,10 +24,10 @@
 // column is to be believed; of nodes on two levels the element at the finer vertex is taken for
 // both, since there a point's displacement is near the hat's mean, which is what reciprocity is
 // about. Where the least eigenvalue is under 2^-10, the
-// diagonal is raised by a shift. All sets with one shift are parts of one matrix, so contact has one
-// elastic energy whatever nodes come and go; and a larger shift is a softer body, which only loses
-// energy. So the owner never lets the shift fall while there is contact (held_shift), and no loop
-// can gain. (Tried and lost: one shift for a whole model. Thin parts make it larger than the
+// diagonal is raised by a shift. All sets with one shift are parts of one matrix, so contact has
+// one elastic energy whatever nodes come and go; and a larger shift is a softer body, which only
+// loses energy. So the owner never lets the shift fall while there is contact (held_shift), and no
+// loop can gain. (Tried and lost: one shift for a whole model. Thin parts make it larger than the
 // diagonal, 3 to 7 on the evaluation mesh bunny_L4, where patches need none or tenths.)
 //
 // When nodes come and go, M and its inverse follow by bordering in O(s^2) (bordering.h); a residual
@@ -39,17 +39,17 @@
 #include "reconstruction.h"
 
 typedef struct pliant_capacitance {
-    int32_t count;      // s; -1: holds no type
+    int32_t count;       // s; -1: holds no type
     pliant_node *nodes;  // shape [count], in no order: this is the order of M
     int32_t *order;      // shape [count]: members by ascending vertex; with nodes, the key
     int32_t *slot;       // shape [count]: where plan[domain] leaves the node's value
     pliant_reconstruction plan[PLIANT_DOMAIN_COUNT];  // values of S, a plan a domain
-    size_t leading;      // of matrix and inverse
-    double *scale;       // shape [3 count]: D
-    double *matrix;      // M
-    double *inverse;     // M^-1
-    size_t stride;       // of product
-    float *product;      // C^-1, 3 s columns of `stride`
+    size_t leading;                                   // of matrix and inverse
+    double *scale;                                    // shape [3 count]: D
+    double *matrix;                                   // M
+    double *inverse;                                  // M^-1
+    size_t stride;                                    // of product
+    float *product;                                   // C^-1, 3 s columns of `stride`
     double largest[PLIANT_DOMAIN_COUNT];  // diagonal of A E^T Xi E; at each node's arrival
     double shift;          // in M's diagonal; INFINITY: nothing helped, product is zero
     double residual;       // |M M^-1 x - x| / |x| for a random x, after an update
@@ -64,16 +64,16 @@ typedef struct pliant_capacitance_scratch {
     double held_shift;             // least shift of what is built: the owner's, 0 when stored
     pliant_reconstruction_scratch domain[PLIANT_DOMAIN_COUNT];
     pliant_reconstruction border[PLIANT_DOMAIN_COUNT];  // values of the nodes that come
-    int32_t *positions;   // shape [capacity]
-    int32_t *index;       // shape [capacity]
-    int32_t *slots;       // shape [capacity]
-    int32_t *added;       // shape [capacity]
-    int32_t *border_slot; // shape [capacity]
-    int32_t *pivots;      // shape [3 capacity]
-    double *work_matrix;  // [3 capacity][leading]
-    double *work;         // of dense.h and bordering.h
-    double *vectors;      // shape [6][leading]
-    float *blocks;        // shape [slots][16]
+    int32_t *positions;                                 // shape [capacity]
+    int32_t *index;                                     // shape [capacity]
+    int32_t *slots;                                     // shape [capacity]
+    int32_t *added;                                     // shape [capacity]
+    int32_t *border_slot;                               // shape [capacity]
+    int32_t *pivots;                                    // shape [3 capacity]
+    double *work_matrix;                                // [3 capacity][leading]
+    double *work;                                       // of dense.h and bordering.h
+    double *vectors;                                    // shape [6][leading]
+    float *blocks;                                      // shape [slots][16]
 } pliant_capacitance_scratch;
 
 // How many domains have both rows and columns: 2 with supports, else 1.
@@ -98,16 +98,14 @@ int32_t pliant_capacitance_matches(const pliant_capacitance *capacitance, const 
 typedef struct pliant_capacitance_difference {
     int32_t dropped, added;
 } pliant_capacitance_difference;
-pliant_capacitance_difference
-pliant_capacitance_compare(const pliant_capacitance *capacitance, const pliant_node *nodes,
-                           int32_t count);
+pliant_capacitance_difference pliant_capacitance_compare(const pliant_capacitance *capacitance,
+                                                         const pliant_node *nodes, int32_t count);
 // Make a copy that update may then change.
-void pliant_capacitance_copy(const pliant_capacitance *from,
-                             pliant_capacitance *to);
-// Turn the type, which is not rough, into that of `nodes` by bordering. 0: the type has to be built,
-// since a residual is beyond 1e-9 (the inverse has drifted) or a pivot of the nodes that came is
-// too small. These pivots stand for definiteness: for a symmetric M exactly, for a stored one, whose
-// skew part is some percent, but for its square.
+void pliant_capacitance_copy(const pliant_capacitance *from, pliant_capacitance *to);
+// Turn the type, which is not rough, into that of `nodes` by bordering. 0: the type has to be
+// built, since a residual is beyond 1e-9 (the inverse has drifted) or a pivot of the nodes that
+// came is too small. These pivots stand for definiteness: for a symmetric M exactly, for a stored
+// one, whose skew part is some percent, but for its square.
 int32_t pliant_capacitance_update(const pliant_model *model, const pliant_node *nodes,
                                   int32_t count, pliant_capacitance_scratch *scratch,
                                   pliant_capacitance *capacitance);
@@ -117,8 +115,8 @@ int32_t pliant_capacitance_update(const pliant_model *model, const pliant_node *
 void pliant_capacitance_extend(const pliant_model *model, int32_t kept,
                                pliant_capacitance_scratch *scratch, pliant_capacitance *type);
 
-// E^T Xi E itself, at (3 i + r) + (3 j + c) leading in `matrix`; the extraction part of build, after
-// plan: for tests and benchmarks. Members are in the order of `nodes`.
+// E^T Xi E itself, at (3 i + r) + (3 j + c) leading in `matrix`; the extraction part of build,
+// after plan: for tests and benchmarks. Members are in the order of `nodes`.
 void pliant_capacitance_plan(const pliant_model *model, const pliant_node *nodes, int32_t count,
                              pliant_capacitance_scratch *scratch, pliant_capacitance *capacitance);
 void pliant_capacitance_extract(const pliant_model *model, const pliant_capacitance *capacitance,

@@ -35,8 +35,7 @@ static int32_t list_nodes(const pliant_model *model, int32_t count, int32_t firs
     const int32_t available = domain->wavelet->level_offset[level + 1];
     if (count > available / 2) count = available / 2;
     if (first + count > available) first = available - count;
-    for (int32_t i = 0; i < count; i++)
-        nodes[i] = (pliant_node){level, domain->nodes[first + i]};
+    for (int32_t i = 0; i < count; i++) nodes[i] = (pliant_node){level, domain->nodes[first + i]};
     return count;
 }
 
@@ -120,8 +119,8 @@ void pliant_cost_calibrate(pliant_cost *cost, const pliant_model *model, int32_t
 double pliant_cost_of_build(const pliant_cost *cost, int32_t count)
 {
     const double s = count, n = 3 * s;
-    return cost->build_trust * (cost->node * s + cost->block * s * s + cost->square * n * n +
-                                cost->cube * n * n * n);
+    return cost->build_trust *
+           (cost->node * s + cost->block * s * s + cost->square * n * n + cost->cube * n * n * n);
 }
 
 double pliant_cost_of_update(const pliant_cost *cost, int32_t count,
@@ -147,7 +146,6 @@ int32_t pliant_cost_prefers_update(int32_t count, pliant_capacitance_difference 
 void pliant_cost_learn(double *trust, double predicted, double measured)
 {
     if (!(predicted > 0)) return;
-    const double ratio =
-        fmin(largest_surprise, fmax(1 / largest_surprise, measured / predicted));
+    const double ratio = fmin(largest_surprise, fmax(1 / largest_surprise, measured / predicted));
     *trust = fmin(1e3, fmax(1e-3, *trust * (1 + learning_rate * (ratio - 1))));
 }

@@ -33,8 +33,8 @@ double pliant_cost_of_update(const pliant_cost *cost, int32_t count,
 // Steps (4) to (6) for `count` nodes whose columns have `blocks` blocks.
 double pliant_cost_of_contact(const pliant_cost *cost, int32_t count, uint64_t blocks);  // ns
 
-// Is updating the quicker way, by rule of thumb? Results then do not depend on how fast a machine was
-// at the moment: only deadlines make them.
+// Is updating the quicker way, by rule of thumb? Results then do not depend on how fast a machine
+// was at the moment: only deadlines make them.
 int32_t pliant_cost_prefers_update(int32_t count, pliant_capacitance_difference difference);
 
 // A prediction by build or update, and what it came to: corrects the trust that is pointed to.

@@ -99,8 +99,8 @@ int32_t pliant_dense_definite(size_t n, size_t stride, double *matrix, double *w
         const size_t width = n - k < panel ? n - k : panel;
         for (size_t j = 0; j < width; j++)
             for (size_t i = 0; i < k; i++) work[i + j * rows] = -matrix[k + j + i * stride];
-        multiply_add(rows - k, width, k, matrix + k, stride, work, rows,
-                     matrix + k + k * stride, stride);
+        multiply_add(rows - k, width, k, matrix + k, stride, work, rows, matrix + k + k * stride,
+                     stride);
         for (size_t j = k; j < k + width; j++) {
             double *column = matrix + j * stride;
             if (!(column[j] > 0)) return 0;  // NaN is not positive either
@@ -127,8 +127,8 @@ static void swap_rows(size_t n, size_t stride, double *matrix, size_t a, size_t 
 }
 
 // Eliminate the columns K = k .. k+width-1 of all rows, in place: afterwards they hold what the
-// product G of these steps makes of the unit vectors e_K. 0 when a pivot vanishes. `pivots` NULL: no
-// rows are swapped, and pivots have to be above *least.
+// product G of these steps makes of the unit vectors e_K. 0 when a pivot vanishes. `pivots` NULL:
+// no rows are swapped, and pivots have to be above *least.
 INLINE int32_t eliminate_panel(size_t n, size_t stride, size_t k, size_t width, double *matrix,
                                int32_t *pivots, double *least, double *most)
 {

@@ -45,7 +45,8 @@ typedef enum pliant_dense_progress {
     PLIANT_DENSE_DONE = 0,
     PLIANT_DENSE_MORE = 1,
 } pliant_dense_progress;
-// One slice: some 2 n PLIANT_DENSE_PANEL^2 operations. `work` as for invert, not kept between slices.
+// One slice: some 2 n PLIANT_DENSE_PANEL^2 operations. `work` as for invert, not kept between
+// slices.
 pliant_dense_progress pliant_dense_sweep_step(size_t n, size_t stride, double *matrix,
                                               double least_pivot, double *work,
                                               pliant_dense_sweep *sweep);

@@ -8,8 +8,8 @@
 enum { slice_members = 8 };
 // Before a slice this many times its usual length must be left.
 static const double margin = 2;
-// What is not known yet is taken for this long. Slow slices are forgotten at this rate, also by waiting
-// for time to run one: the first of a kind pays for memory that was never touched.
+// What is not known yet is taken for this long. Slow slices are forgotten at this rate, also by
+// waiting for time to run one: the first of a kind pays for memory that was never touched.
 static const double first_slice_ns = 50e3, forget = 0.05;
 
 void pliant_pending_lay_out(pliant_arena *arena, const pliant_model *model, int32_t capacity,
@@ -40,7 +40,8 @@ static void run_slice(const pliant_model *model, pliant_capacitance_scratch *scr
 {
     pliant_capacitance *type = &pending->type;
     const int32_t count = type->count;
-    const int32_t end = count - pending->next < slice_members ? count : pending->next + slice_members;
+    const int32_t end =
+        count - pending->next < slice_members ? count : pending->next + slice_members;
     switch (pending->stage) {
     case PLIANT_PENDING_PLAN:
         pliant_capacitance_plan_members(model, scratch, type);
@@ -92,9 +93,9 @@ void pliant_pending_advance(const pliant_model *model, const pliant_node *nodes,
                             int64_t deadline, pliant_capacitance_scratch *scratch,
                             pliant_pending *pending)
 {
-    const int32_t is_same =
-        pending->stage != PLIANT_PENDING_NONE && pending->type.shift == scratch->held_shift &&
-        pliant_capacitance_matches(&pending->type, nodes, count);
+    const int32_t is_same = pending->stage != PLIANT_PENDING_NONE &&
+                            pending->type.shift == scratch->held_shift &&
+                            pliant_capacitance_matches(&pending->type, nodes, count);
     if (!is_same) {
         // A set that is gone with the next solve is not worth its time.
         begin(nodes, count, pending);

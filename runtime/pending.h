@@ -1,10 +1,10 @@
-// pending.h: the type of a set that a deadline left no time for, built in the time that later solves
-// have left.
+// pending.h: the type of a set that a deadline left no time for, built in the time that later
+// solves have left.
 //
 // A late solve resolves its constraints on a coarser level. While the set that was asked for stays
 // the same, as in a contact that rests, every solve goes on with its inverse for as long as its own
-// deadline allows; when it is whole, the solver takes it among its types, and contact is resolved as
-// asked. Work is cut into slices of some ten to a hundred microseconds.
+// deadline allows; when it is whole, the solver takes it among its types, and contact is resolved
+// as asked. Work is cut into slices of some ten to a hundred microseconds.
 #pragma once
 
 #include "capacitance.h"
@@ -26,7 +26,8 @@ typedef struct pliant_pending {
     pliant_pending_stage stage;
     int32_t next;  // member to go on with
     pliant_dense_sweep sweep;
-    double slice_ns[PLIANT_PENDING_STAGE_COUNT];  // what slices of a stage took of late, the slow ones
+    double
+        slice_ns[PLIANT_PENDING_STAGE_COUNT];  // what slices of a stage took of late, the slow ones
 } pliant_pending;
 
 void pliant_pending_lay_out(pliant_arena *arena, const pliant_model *model, int32_t capacity,

@@ -261,7 +261,8 @@ static void mark_support(pliant_solver *solver, int32_t d)
         }
     }
     int32_t distinct = 0;
-    for (int32_t word = 0; 64 * word < count; word++) distinct += __builtin_popcountll(field->support[word]);
+    for (int32_t word = 0; 64 * word < count; word++)
+        distinct += __builtin_popcountll(field->support[word]);
     field->is_sparse = distinct <= count / sparse_part;
 }
 

@@ -89,8 +89,8 @@ struct pliant_solver {
     int32_t solved_count;
     pliant_constraint *solved;  // shape [capacity], vertices ascending: S as it was resolved
     pliant_vec3 *reference;     // shape [capacity]: g_S of step (5)
-    const pliant_capacitance *solved_type;  // NULL: S is empty
-    float *fixed_displacement;  // shape [k][4]: supports of the finest level
+    const pliant_capacitance *solved_type;      // NULL: S is empty
+    float *fixed_displacement;                  // shape [k][4]: supports of the finest level
     uint32_t used_levels[PLIANT_DOMAIN_COUNT];  // levels of loads and S in a domain, as bits
     pliant_field fields[PLIANT_DOMAIN_COUNT];
     pliant_solver_report report;
@@ -105,11 +105,11 @@ struct pliant_solver {
     pliant_cost cost;
     pliant_constraint *candidate;  // shape [capacity]: S on a coarser level
     pliant_node *key;              // shape [capacity]
-    pliant_term *terms;       // shape [capacity]
-    float *contact_values;    // shape [3 capacity]: q of step (4)
-    float *contact_solution;  // shape [stride]
-    int32_t *query_scratch;   // shape [query_capacity]
-    int32_t *all_rows;        // shape [max(m, k)]: 0, 1, 2, ...
+    pliant_term *terms;            // shape [capacity]
+    float *contact_values;         // shape [3 capacity]: q of step (4)
+    float *contact_solution;       // shape [stride]
+    int32_t *query_scratch;        // shape [query_capacity]
+    int32_t *all_rows;             // shape [max(m, k)]: 0, 1, 2, ...
 };
 
 // Index in `constraints` (shape [count], ascending) of a vertex, or where it would go as -1 -
@@ -126,8 +126,9 @@ void pliant_loads_set(pliant_solver *solver, pliant_node node, pliant_vec3 value
 // load_list.c: enter a list; take it out again, with whatever of it is in the sum.
 void pliant_load_list_enter(pliant_solver *solver, pliant_load_list *list);
 void pliant_load_list_leave(pliant_solver *solver, pliant_load_list *list);
-// All its tractions become zero. Then one more, which stays until the next clear; loads has room for
-// `capacity`, of which those still on their way out of the sum take a part. 0: there is none left.
+// All its tractions become zero. Then one more, which stays until the next clear; loads has room
+// for `capacity`, of which those still on their way out of the sum take a part. 0: there is none
+// left.
 void pliant_load_list_clear(pliant_solver *solver, pliant_load_list *list);
 int32_t pliant_load_list_press(pliant_solver *solver, pliant_load_list *list, int32_t capacity,
                                pliant_node node, pliant_vec3 traction);
@@ -149,7 +150,8 @@ const pliant_capacitance *pliant_solver_resolve(pliant_solver *solver, int64_t d
 // What solving for the constraints as they are stated would take, ns.
 double pliant_solver_predict(pliant_solver *solver);
 
-// types.c: use what is left until `deadline` for the set that was asked for, when it was not solved.
+// types.c: use what is left until `deadline` for the set that was asked for, when it was not
+// solved.
 void pliant_solver_prepare(pliant_solver *solver, int64_t deadline);
 // Solve again on the same S with the same type, for other loads.
 void pliant_solver_repeat(pliant_solver *solver);

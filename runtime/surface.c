@@ -22,7 +22,8 @@ static void reconstruct(pliant_solver *solver, int32_t d, int32_t level)
     if (field->is_summed && field->reconstructed == level) return;
     pliant_solver_sum(solver, d);
     const pliant_wavelet *wavelet = solver->model->domains[d].wavelet;
-    if (field->is_sparse) pliant_wavelet_inverse_online_sparse(wavelet, level, field->support, field->g);
+    if (field->is_sparse)
+        pliant_wavelet_inverse_online_sparse(wavelet, level, field->support, field->g);
     else pliant_wavelet_inverse_online(wavelet, level, field->g);
     field->reconstructed = level;
 }
@@ -64,7 +65,8 @@ pliant_status pliant_solver_surface(pliant_solver *solver, int32_t level, pliant
     const uint32_t finest = 1u << model->finest_level;
     if (solver->used_levels[PLIANT_DOMAIN_FIXED] & ~finest)
         for (int32_t p = 0; p < fixed_count; p++)
-            u[fixed_domain->nodes[p]] = pliant_solver_boundary_value(solver, fixed_domain->nodes[p]);
+            u[fixed_domain->nodes[p]] =
+                pliant_solver_boundary_value(solver, fixed_domain->nodes[p]);
     else pack(solver->fixed_displacement, fixed_domain->nodes, fixed_count, u);
     // (8) at S the displacement is known: specified at free nodes, solved for at freed ones.
     for (int32_t i = 0; i < solver->solved_count; i++) {

@@ -22,7 +22,8 @@ typedef struct plan {
     double make_ns, total_ns;
 } plan;
 
-// May a type be updated? A shift that only one set needed is not for others, nor what made one rough.
+// May a type be updated? A shift that only one set needed is not for others, nor what made one
+// rough.
 static int32_t is_sound(const pliant_solver *solver, const pliant_capacitance *type)
 {
     return type->count >= 0 && type->status == PLIANT_OK &&
@@ -47,9 +48,8 @@ static plan plan_set(pliant_solver *solver, const pliant_constraint *set, int32_
     uint64_t blocks = 0;
     for (int32_t i = 0; i < count; i++) {
         const pliant_node node = set[i].node;
-        const uint64_t *offset =
-            pliant_model_columns(model, PLIANT_DOMAIN_FREE, node)->offset +
-            model->position[node.vertex];
+        const uint64_t *offset = pliant_model_columns(model, PLIANT_DOMAIN_FREE, node)->offset +
+                                 model->position[node.vertex];
         blocks += offset[1] - offset[0];
         solver->key[i] = node;
     }
@@ -100,8 +100,8 @@ static pliant_capacitance *make(pliant_solver *solver, const plan *planned,
     int32_t is_updated = 0;
     if (planned->near) {
         if (type != planned->near) pliant_capacitance_copy(planned->near, type);
-        is_updated = pliant_capacitance_update(solver->model, solver->key, count, &solver->scratch,
-                                               type);
+        is_updated =
+            pliant_capacitance_update(solver->model, solver->key, count, &solver->scratch, type);
         solver->report.updated = planned->difference.dropped + planned->difference.added;
         solver->report.residual = type->residual;
     }

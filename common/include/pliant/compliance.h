@@ -1,4 +1,5 @@
-// compliance.h: the contact compliance of one level as a symmetric operator, and how definite it is.
+// compliance.h: the contact compliance of one level as a symmetric operator, and how definite it
+// is.
 //
 // With G_ij the 3x3 value at vertex k_i of the stored hierarchical Green's function xi^_[l,k_j]
 // (GF-69) and A_i the area of hat [l,k_i], tractions s at the hats do the work s . A G s, which a
@@ -13,7 +14,8 @@
 #include "pliant/hats.h"
 #include "pliant/lanczos.h"
 
-// Some or all stored columns of a level: those of positions column[i], or of i where column is NULL.
+// Some or all stored columns of a level: those of positions column[i], or of i where column is
+// NULL.
 typedef struct pliant_compliance_columns {
     int32_t count;
     const int32_t *column;   // [count] or NULL; may be unordered
@@ -22,8 +24,8 @@ typedef struct pliant_compliance_columns {
     const float *block;      // [offset[count]][3][3]
 } pliant_compliance_columns;
 
-// Where the columns lie with several processes: add up values[count] over all of them, with the same
-// result on each.
+// Where the columns lie with several processes: add up values[count] over all of them, with the
+// same result on each.
 typedef void (*pliant_compliance_sum)(void *context, double *values, int32_t count);
 
 typedef struct pliant_compliance_def {
@@ -36,8 +38,8 @@ typedef struct pliant_compliance_def {
 } pliant_compliance_def;
 
 // Smallest and largest eigenvalue of M, to 1e-3. Collective where columns are apart. All of
-// `def` is read during the call only. PLIANT_ERR_ARGUMENT: the level has no hats, or numbers are too
-// large for doubles.
+// `def` is read during the call only. PLIANT_ERR_ARGUMENT: the level has no hats, or numbers are
+// too large for doubles.
 PLIANT_UNUSED_RESULT pliant_status pliant_compliance_eigenvalues(const pliant_compliance_def *def,
                                                                  pliant_lanczos_result *result,
                                                                  pliant_error *err);

@@ -20,14 +20,14 @@ typedef struct pliant_lanczos_def {
 
 typedef struct pliant_lanczos_result {
     double smallest, largest;
-    // Norms of M x - lambda x for the unit vectors found: an eigenvalue is that near, and the smallest
-    // eigenvalue is no larger than `smallest`.
+    // Norms of M x - lambda x for the unit vectors found: an eigenvalue is that near, and the
+    // smallest eigenvalue is no larger than `smallest`.
     double smallest_residual, largest_residual;
     int32_t steps;
 } pliant_lanczos_result;
 
-// Allocates. The start depends on n alone, so that two runs agree. PLIANT_ERR_ARGUMENT: the operator
-// gave a number that is not finite.
+// Allocates. The start depends on n alone, so that two runs agree. PLIANT_ERR_ARGUMENT: the
+// operator gave a number that is not finite.
 PLIANT_UNUSED_RESULT pliant_status pliant_lanczos_extremes(const pliant_lanczos_def *def,
                                                            pliant_lanczos_result *result,
                                                            pliant_error *err);

@@ -111,8 +111,8 @@ typedef enum pliant_compliance {
 
 typedef struct pliant_solver_def {
     int32_t constraint_capacity;  // s: the capacitance matrix (GF-19) is 3s x 3s. Default 64
-    int32_t load_capacity;  // nodes with a specified traction or support displacement. Default 256
-    int32_t cache_count;    // boundary-value-problem types whose inverse is kept. Default 4
+    int32_t load_capacity;   // nodes with a specified traction or support displacement. Default 256
+    int32_t cache_count;     // boundary-value-problem types whose inverse is kept. Default 4
     pliant_storage storage;  // Default PLIANT_STORAGE_FLOAT
     pliant_compliance compliance;  // Default PLIANT_COMPLIANCE_STORED
 } pliant_solver_def;
@@ -124,12 +124,13 @@ PLIANT_API void pliant_solver_destroy(pliant_solver *solver);  // NULL is fine
 
 // Statements change the state and cost next to nothing; solve does the work, and what is read stays
 // that of the last solve until the next. The last statement about a vertex holds, on whatever level
-// it was made; their order does not matter otherwise. Levels may be mixed. Displace prescribes the displacement of a free vertex (its type changes:
-// CMA). Press prescribes the traction of a free vertex, or frees a fixed one and loads it. Support
-// prescribes a fixed vertex's displacement. The latter two on fixed vertices need the fixed blocks
-// (has_supports; else PLIANT_ERR_MISSING). PLIANT_ERR_ARGUMENT: no such node, a number that is not
-// finite, displace on a fixed vertex, support on a free one. PLIANT_ERR_CAPACITY: the definition's
-// room for constraints or loads is taken.
+// it was made; their order does not matter otherwise. Levels may be mixed. Displace prescribes the
+// displacement of a free vertex (its type changes: CMA). Press prescribes the traction of a free
+// vertex, or frees a fixed one and loads it. Support prescribes a fixed vertex's displacement. The
+// latter two on fixed vertices need the fixed blocks (has_supports; else PLIANT_ERR_MISSING).
+// PLIANT_ERR_ARGUMENT: no such node, a number that is not finite, displace on a fixed vertex,
+// support on a free one. PLIANT_ERR_CAPACITY: the definition's room for constraints or loads is
+// taken.
 PLIANT_CALL pliant_status pliant_solver_displace(pliant_solver *solver, pliant_node node,
                                                  pliant_vec3 u);  // m
 PLIANT_CALL pliant_status pliant_solver_press(pliant_solver *solver, pliant_node node,
@@ -153,10 +154,10 @@ pliant_solver_constraint_count(const pliant_solver *solver);  // s: nodes whose 
 // operation counts calibrated at create, would end after it, the constraints are resolved on the
 // finest level that fits (GF 8.2): a constraint on a finer level stays when its vertex belongs to
 // that level, with that level's hat; it is left out when such a hat covers its vertex; else it
-// stays as it is. Then the status is PLIANT_LATE and the state is valid. What time is left goes into
-// the inverse of the full set, so that a contact that rests is resolved as stated after some
-// solves. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of this patch, or of
-// its nodes of one level, is not positive definite; finite, displacements at S as specified, but
+// stays as it is. Then the status is PLIANT_LATE and the state is valid. What time is left goes
+// into the inverse of the full set, so that a contact that rests is resolved as stated after some
+// solves. PLIANT_ROUGH (stored compliance only; before PLIANT_LATE): the matrix of this patch, or
+// of its nodes of one level, is not positive definite; finite, displacements at S as specified, but
 // forces are unreliable.
 PLIANT_CALL pliant_status pliant_solver_solve(pliant_solver *solver, int64_t deadline);
 
@@ -183,11 +184,11 @@ PLIANT_API pliant_vec3 pliant_solver_node_force(const pliant_solver *solver, pli
 typedef struct pliant_solver_report {
     int32_t constraint_count;  // s, of what was solved
     int32_t asked_count;       // s of what was stated
-    int32_t level;             // finest constraint level used; finest stored one without constraints
-    int32_t is_late;           // 1: resolved on a coarser level than stated
-    float prepared;            // part of the stated set's inverse that late solves have made, 0 to 1
-    int32_t factored;       // 1: a new boundary-value-problem type was factored from scratch
-    int32_t updated;        // nodes that an inverse was updated for; 0 and 0: found in the cache
+    int32_t level;           // finest constraint level used; finest stored one without constraints
+    int32_t is_late;         // 1: resolved on a coarser level than stated
+    float prepared;          // part of the stated set's inverse that late solves have made, 0 to 1
+    int32_t factored;        // 1: a new boundary-value-problem type was factored from scratch
+    int32_t updated;         // nodes that an inverse was updated for; 0 and 0: found in the cache
     int32_t summed_columns;  // columns added because they changed (GF-11)
     double residual;         // of the inverse, |M M^-1 x - x| / |x|, when it was updated; else 0
     double shift;            // in the scaled compliance's diagonal, whose elements are else one
@@ -205,17 +206,17 @@ PLIANT_API pliant_solver_report pliant_solver_last(const pliant_solver *solver);
 // node j's hat, m/N, at 3 i + r, 3 j + c. By the definition's rule, so symmetric positive definite
 // when that is passive. Nodes that are themselves displaced have none: PLIANT_ERR_ARGUMENT, as for
 // nodes that are not free or `count` above the definition's constraint_capacity. To be called after
-// a solve; it does not change it. A passive raise stays until a call with `count` 0, which is to say
-// that contact through these nodes has ended.
+// a solve; it does not change it. A passive raise stays until a call with `count` 0, which is to
+// say that contact through these nodes has ended.
 PLIANT_CALL pliant_status pliant_solver_compliance(pliant_solver *solver, const pliant_node *nodes,
                                                    int32_t count, double *matrix);
 
 // ---- Detail ----
 
-// A finer shape that moves with the elastic surface (GF 9.2): a displaced subdivision surface, whose
-// control mesh is a level of the model. Evaluating is linear in what is asked for, on the state of
-// no solver: u comes from pliant_solver_surface, or is NULL for the shape at rest. A detail is const
-// after create, and threads may share it; the model must outlive it.
+// A finer shape that moves with the elastic surface (GF 9.2): a displaced subdivision surface,
+// whose control mesh is a level of the model. Evaluating is linear in what is asked for, on the
+// state of no solver: u comes from pliant_solver_surface, or is NULL for the shape at rest. A
+// detail is const after create, and threads may share it; the model must outlive it.
 //
 // Vertices 0 .. n-1 of the detail are those of the model, where these are at rest. They do not
 // follow it exactly: Loop's rule averages, so that where six edges meet the detail moves by half of
@@ -254,8 +255,9 @@ PLIANT_CALL pliant_status pliant_detail_evaluate(const pliant_detail *detail, co
 PLIANT_CALL pliant_status pliant_detail_points(const pliant_detail *detail, const pliant_vec3 *u,
                                                const int32_t *vertices, int32_t count,
                                                pliant_vec3 *positions, pliant_vec3 *normals);
-// The control vertices that points and normals of these vertices depend on: control[*control_count],
-// ascending, some 12 to 20 for one vertex. PLIANT_ERR_CAPACITY: there are more than `capacity`.
+// The control vertices that points and normals of these vertices depend on:
+// control[*control_count], ascending, some 12 to 20 for one vertex. PLIANT_ERR_CAPACITY: there are
+// more than `capacity`.
 PLIANT_CALL pliant_status pliant_detail_support(const pliant_detail *detail,
                                                 const int32_t *vertices, int32_t count,
                                                 int32_t *control, int32_t capacity,
@@ -301,8 +303,8 @@ PLIANT_CALL pliant_status pliant_patch_tolerate(pliant_patch *patch, double tole
 
 // Choose nodes, state them to the solver (which then says what pliant_solver_solve would), solve,
 // and refine until the error is within the tolerance. Everything of the solver can be read
-// afterwards. PLIANT_LATE: the deadline came first, or the solver's room or the file's levels do not
-// go as far; the state is valid, and the report tells its error. Calls go on from there.
+// afterwards. PLIANT_LATE: the deadline came first, or the solver's room or the file's levels do
+// not go as far; the state is valid, and the report tells its error. Calls go on from there.
 // PLIANT_ROUGH as pliant_solver_solve. Does not refuse.
 PLIANT_CALL pliant_status pliant_patch_solve(pliant_patch *patch, int64_t deadline);
 
