@@ -7,6 +7,7 @@
 // One thread; medians. The bound is what one thread reads of the same amount of memory in the same
 // run: weights, columns, shape at rest, once. Warm: nothing else ran in between; cold: 16 MB were
 // read, more than a core's own caches.
+#include "bench.h"
 #include "synthetic_model.h"
 
 #include "detail.h"
@@ -27,25 +28,6 @@ static double now_ns(void)
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
     return 1e9 * (double)t.tv_sec + (double)t.tv_nsec;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *times, int count)
-{
-    qsort(times, (size_t)count, sizeof *times, compare_doubles);
-    return times[count / 2];
-}
-
-static void require(pliant_status status, const pliant_error *err)
-{
-    if (status >= 0) return;
-    fprintf(stderr, "bench_detail: %s: %s\n", pliant_status_name(status), err ? err->text : "");
-    exit(1);
 }
 
 // Nanoseconds in which one thread reads this much, over and over.

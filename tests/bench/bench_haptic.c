@@ -10,6 +10,7 @@
 // step has another set, whose solve stays under a millisecond at the 99.99th percentile, with a
 // deadline and without. Times in microseconds: of the clock, with whatever else the machine did
 // meanwhile, and of the thread alone.
+#include "bench.h"
 #include "pliant/pliant.h"
 
 #include <math.h>
@@ -27,13 +28,6 @@ static const int32_t sizes[size_count] = {10, 20, 30, 40, 60, 80, 100, 130, 160,
 static const int64_t period_ns = 1000000, frame_ns = 16666667;
 // A patch's steps at least, for a 99.99th percentile that is not the worst one.
 enum { least_steps = 20000 };
-
-static void require(pliant_status status, const pliant_error *err)
-{
-    if (status >= 0) return;
-    fprintf(stderr, "bench_haptic: %s: %s\n", pliant_status_name(status), err ? err->text : "");
-    exit(1);
-}
 
 // ---- Samples ----
 

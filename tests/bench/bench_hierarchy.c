@@ -4,6 +4,7 @@
 // usage: bench_hierarchy MODEL.h5 ...   Models with the columns of several levels; others are told
 // and passed over. Patches are balls about free vertices that hold about `patch_size` nodes of the
 // finest level; on coarser levels the same balls hold fewer.
+#include "bench.h"
 #include "solver.h"
 
 #include <math.h>
@@ -12,30 +13,6 @@
 #include <string.h>
 
 enum { patch_size = 240, patch_count = 9, run_count = 25 };
-
-static double now_us(void)
-{
-    return 1e-3 * (double)pliant_clock_ns();
-}
-
-static void require(pliant_status status, const pliant_error *err)
-{
-    if (status >= 0) return;
-    fprintf(stderr, "bench_hierarchy: %s\n", err ? err->text : pliant_status_name(status));
-    exit(1);
-}
-
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, int count)
-{
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return values[count / 2];
-}
 
 static double square_distance(const pliant_model *model, int32_t a, int32_t b)
 {
@@ -52,7 +29,7 @@ static double radius_of(const pliant_model *model, int32_t centre, int32_t count
     if (!distances) exit(1);
     for (int32_t p = 0; p < domain->count; p++)
         distances[p] = square_distance(model, centre, domain->nodes[p]);
-    qsort(distances, (size_t)domain->count, sizeof *distances, by_value);
+    qsort(distances, (size_t)domain->count, sizeof *distances, bench_compare);
     const double radius = distances[(count < domain->count ? count : domain->count) - 1];
     free(distances);
     return radius;

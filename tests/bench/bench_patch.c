@@ -4,6 +4,7 @@
 // usage: bench_patch [MODEL.h5 ...]      default: a synthetic sphere, 642 vertices
 // One thread; microseconds are medians. "fine" constrains every vertex of the patch on the finest
 // level. Displacements are relative to the push, forces to the fine solution's.
+#include "bench.h"
 #include "synthetic_model.h"
 
 #include "model.h"
@@ -20,28 +21,10 @@
 enum { patch_limit = 512, repeat_count = 21, place_count = 3 };
 static const double tolerances[] = {0.2, 0.05, 0.01};
 
-static double now_us(void)
-{
-    return (double)pliant_clock_ns() * 1e-3;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static double quantile(double *values, int count, double q)
 {
-    qsort(values, (size_t)count, sizeof *values, compare_doubles);
+    qsort(values, (size_t)count, sizeof *values, bench_compare);
     return values[(int)(q * (count - 1) + 0.5)];
-}
-
-static void require(pliant_status status, const pliant_error *err)
-{
-    if (status >= 0) return;
-    fprintf(stderr, "bench_patch: %s: %s\n", pliant_status_name(status), err ? err->text : "");
-    exit(1);
 }
 
 static double distance(pliant_vec3 a, pliant_vec3 b)

@@ -4,6 +4,7 @@
 // vertices. One thread, another patch (of the four whose inverses a solver caches by default) every
 // frame, warm caches or a second-level cache swept before every frame; medians in microseconds. The
 // baseline is OpenBLAS on a random dense matrix of the model's size.
+#include "bench.h"
 #include "synthetic_model.h"
 
 #include "capacitance.h"
@@ -33,30 +34,6 @@ static const double half_goal[size_count] = {2.5, 3, 3.5, 5, 10};
 static const double cold_goal[size_count] = {15, 15, 18, 25, 0};
 // More than a core's own caches hold; the last level is shared and often too large to sweep.
 enum { sweep_bytes = 16 << 20, cold_frame_count = 41 };
-
-static double now_us(void)
-{
-    return (double)pliant_clock_ns() * 1e-3;
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *times, int count)
-{
-    qsort(times, (size_t)count, sizeof *times, compare_doubles);
-    return times[count / 2];
-}
-
-static void require(pliant_status status, const pliant_error *err)
-{
-    if (status >= 0) return;
-    fprintf(stderr, "bench_solver: %s: %s\n", pliant_status_name(status), err ? err->text : "");
-    exit(1);
-}
 
 // ---- Patches ----
 
