@@ -65,7 +65,7 @@ SRC_common     := $(sort $(wildcard common/*.c))
 SRC_formats    := $(sort $(filter-out %_hdf5.c,$(wildcard formats/*.c)))
 SRC_hdf5       := $(sort $(wildcard formats/*_hdf5.c))
 SRC_precompute := $(sort $(filter-out precompute/main.c,$(wildcard precompute/*.c precompute/*/*.c)))
-SRC_runtime    := $(sort $(wildcard runtime/*.c))
+SRC_runtime    := $(sort $(wildcard runtime/*.c runtime/lattice/*.c))
 SRC_play       := $(sort $(filter-out runtime/play/main.c,$(wildcard runtime/play/*.c)))
 SRC_info       := $(sort $(filter-out runtime/info/main.c,$(wildcard runtime/info/*.c)))
 SRC_draw       := $(sort $(filter-out runtime/draw/main.c,$(wildcard runtime/draw/*.c)))
@@ -215,7 +215,7 @@ $(OUT)/examples/%: $(OBJ)/runtime/examples/%.o $(LIB_pliant)
 # The longest first: they run side by side. The paper-sized models are for the release alone: under a
 # sanitizer they take a quarter of an hour and see nothing that test_compression does not.
 LONG_TESTS := $(wildcard $(if $(filter release,$(BUILD)),tests/precompute/test_models.c) tests/programs/test_*.c)
-TEST_SRC  := $(LONG_TESTS) $(filter-out $(LONG_TESTS) tests/precompute/test_models.c,$(sort $(wildcard tests/common/test_*.c tests/formats/test_*.c tests/runtime/test_*.c tests/precompute/test_*.c)))
+TEST_SRC  := $(LONG_TESTS) $(filter-out $(LONG_TESTS) tests/precompute/test_models.c,$(sort $(wildcard tests/common/test_*.c tests/formats/test_*.c tests/runtime/test_*.c tests/lattice/test_*.c tests/precompute/test_*.c)))
 ifneq ($(HAVE_PETSC),yes)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif
@@ -265,7 +265,7 @@ bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS) $(DETAIL_MODEL)  ## run the benchm
 FUZZ_SECONDS ?= 60
 FUZZ_SRC     := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 FUZZERS      := $(patsubst tests/fuzz/%.c,build/fuzz/%,$(FUZZ_SRC))
-build/fuzz/%: tests/fuzz/%.c $(SRC_common) $(SRC_formats) $(SRC_runtime) $(wildcard */include/pliant/*.h formats/*.h runtime/*.h)
+build/fuzz/%: tests/fuzz/%.c $(SRC_common) $(SRC_formats) $(SRC_runtime) $(wildcard */include/pliant/*.h formats/*.h runtime/*.h runtime/lattice/*.h)
 	@mkdir -p $(@D); echo "  fuzz $@"
 	@clang -std=c11 -D_GNU_SOURCE -g -O1 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined $(MATHS) $(I_tests) $< $(SRC_common) $(SRC_formats) $(SRC_runtime) -o $@ $(LAPACK_LIBS) -lm -lpthread
 fuzzers: $(FUZZERS)  ## build the fuzzers
