@@ -328,8 +328,8 @@ static int32_t count_rows(uint32_t rows[PLIANT_WINDOW_LIMIT][PLIANT_WINDOW_LIMIT
     return count;
 }
 
-void pliant_links_reach(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t w,
-                        pliant_reach *reach)
+void pliant_links_window(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t w,
+                         pliant_reach *reach)
 {
     const uint32_t inside = ((uint32_t)1 << (2 * w + 1)) - 1;
     for (int32_t dz = 0; dz <= 2 * w; dz++)
@@ -339,9 +339,16 @@ void pliant_links_reach(const pliant_links *links, int32_t x, int32_t y, int32_t
                 row < 0 ? 0 : window_bits(row_bits(links, row, ROW_PARTICLES), x - w) & inside;
             reach->member[dz][dy] = reach->window[dz][dy];
         }
-    const int32_t window_size = count_rows(reach->window, w);
-    reach->size = window_size;
+    reach->size = count_rows(reach->window, w);
     reach->is_regular = 1;
+}
+
+void pliant_links_reach(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t w,
+                        pliant_reach *reach)
+{
+    const uint32_t inside = ((uint32_t)1 << (2 * w + 1)) - 1;
+    pliant_links_window(links, x, y, z, w, reach);
+    const int32_t window_size = reach->size;
     if (is_whole(links, x, y, z, w)) return;
 
     for (int32_t dz = 0; dz <= 2 * w; dz++)

@@ -62,6 +62,9 @@ typedef struct pliant_reach {
     uint32_t link[PLIANT_LINK_DIRECTIONS][PLIANT_WINDOW_LIMIT][PLIANT_WINDOW_LIMIT];
 } pliant_reach;
 
+// The particles of the window of (x, y, z), as `window` and `member` of `reach`; size is theirs.
+void pliant_links_window(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t w,
+                         pliant_reach *reach);
 // What the particle at (x, y, z) reaches in w steps.
 void pliant_links_reach(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t w,
                         pliant_reach *reach);

@@ -516,3 +516,61 @@ PLIANT_CALL pliant_status pliant_solver_publish(const pliant_solver *solver,
 // the last one taken; PLIANT_ERR_ARGUMENT: a solver on another model; PLIANT_ERR_CAPACITY: its
 // definition has less room than the exchange's. Compliance is PLIANT_ERR_MISSING until it solves.
 PLIANT_API int32_t pliant_solver_receive(pliant_solver *viewer, pliant_exchange *exchange);
+
+// ---- Lattice bodies: fast lattice shape matching ----
+//
+// A body of large deformations: the cells of a lattice around the surface, particles at their
+// corners, pulled towards where the rigid motions of their neighbourhoods would have them (LSM-n:
+// A. R. Rivers and D. L. James, FastLSM: Fast Lattice Shape Matching for Robust Real-Time
+// Deformation, ACM TOG 26(3), 2007). A step costs the same per particle whatever the half-width,
+// which makes a body stiffer. It is stable whatever is done to it.
+
+typedef struct pliant_lattice pliant_lattice;  // a model's lattice with one half-width; const
+typedef struct pliant_body pliant_body;        // one instance of it
+
+// Lay out the model's lattice with this half-width, 1 to 15; 0: the file's own, without counting
+// regions again. Bodies and threads share it; destroy it after its bodies and before the model.
+// PLIANT_ERR_MISSING: the file has no lattice.
+PLIANT_CALL pliant_status pliant_lattice_create(const pliant_model *model, int32_t half_width,
+                                                pliant_lattice **lattice, pliant_error *err);
+PLIANT_API void pliant_lattice_destroy(pliant_lattice *lattice);  // NULL is fine
+
+typedef struct pliant_lattice_info {
+    int32_t particle_count, cell_count, component_count;
+    int32_t half_width;       // w: regions reach w neighbours far
+    int32_t region_count;     // distinct regions
+    int32_t irregular_count;  // regions that are not all particles of their (2w + 1)^3 window
+    int32_t is_shell;         // 1: cells that the surface touches; 0: what it encloses too
+    int32_t dims[3];          // particles along x, y, z
+    double cell_size, mass;   // m, kg
+} pliant_lattice_info;
+PLIANT_API pliant_lattice_info pliant_lattice_describe(const pliant_lattice *lattice);
+// Rest positions, shape [particle_count][3], m; borrowed until destroy.
+PLIANT_API const float *pliant_lattice_positions(const pliant_lattice *lattice);
+PLIANT_API double pliant_lattice_particle_mass(const pliant_lattice *lattice,
+                                               int32_t particle);  // kg; 0: no such particle
+// The particle whose rest position is nearest to `position` (shape [3], m).
+PLIANT_API int32_t pliant_lattice_nearest(const pliant_lattice *lattice, const double *position);
+
+typedef struct pliant_body_def {
+    pliant_vec3 position;      // where the origin of rest coordinates goes, m. Default 0
+    float rotation[4];         // unit quaternion x, y, z, w, about that origin. Default none
+    pliant_vec3 velocity;      // m/s. Default 0
+    float damping;             // k of LSM 4, 0 to 1, of what is not rigid motion of a region
+    int32_t damping_interval;  // damp every so many steps. Default 1
+    float rigid_damping;       // the same of what is not rigid motion of the whole, 0 to 1
+    // A link of two neighbours that is stretched by more than this part of its length breaks for
+    // good. Default 0: unbreakable
+    float strain_limit;
+    int32_t thread_count;  // 1 to 64, the caller among them. Default 1
+} pliant_body_def;
+PLIANT_API pliant_body_def pliant_body_default(void);
+// `def` may be NULL. The lattice is borrowed until destroy.
+PLIANT_CALL pliant_status pliant_body_create(const pliant_lattice *lattice,
+                                             const pliant_body_def *def, pliant_body **body,
+                                             pliant_error *err);
+PLIANT_API void pliant_body_destroy(pliant_body *body);  // NULL is fine
+
+// Advance by h > 0 seconds: v += (g - x) / h + h f / m, damping, x += h v (LSM-1, 2), fracture. The
+// same bits from any number of threads. Allocates nothing.
+PLIANT_CALL pliant_status pliant_body_step(pliant_body *body, float h);

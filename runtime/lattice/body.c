@@ -1,0 +1,241 @@
+// body.c: one instance of a lattice: its state, and the step that the phases make up.
+#include "lattice/body.h"
+
+#include "lattice/columns.h"
+#include "lattice/plates.h"
+#include "lattice/window.h"
+#include "pliant/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+// ---- Life ----
+
+static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice,
+                            pliant_scratch *scratch)
+{
+    const int32_t w = lattice->half_width;
+    int32_t longest = 0, most_rows = 1;
+    for (int32_t c = 0; c < lattice->column_count; c++)
+        if (lattice->columns[c].length > longest) longest = lattice->columns[c].length;
+    for (int32_t z = 0; z < lattice->dims[2]; z++) {
+        const int32_t *rows = lattice->slab_rows + 2 * z;
+        if (rows[1] - rows[0] > most_rows) most_rows = rows[1] - rows[0];
+    }
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    const int32_t regions = lattice->column_regions;
+    const int32_t strip = (longest > lattice->dims[1] ? longest : lattice->dims[1]) + 4 * w;
+    PLIANT_TAKE(arena, scratch->rows, 6 * length * most_rows);
+    PLIANT_TAKE(arena, scratch->bars,
+                (size_t)lattice->row_blocks * lattice->dims[1] * 6 * PLIANT_LANES + 3 * length);
+    PLIANT_TAKE(arena, scratch->tails, pliant_window_tails(w));
+    PLIANT_TAKE(arena, scratch->doubled, 4 * length);
+    PLIANT_TAKE(arena, scratch->turns, (size_t)longest * 12 * PLIANT_LANES);
+    PLIANT_TAKE(arena, scratch->apart, (size_t)regions * 12);
+    PLIANT_TAKE(arena, scratch->strip, strip);
+    PLIANT_TAKE(arena, scratch->repairs, (size_t)longest * 13 * PLIANT_LANES);
+    PLIANT_TAKE(arena, scratch->repair_of, longest);
+}
+
+static void lay_out(pliant_arena *arena, pliant_body *body)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const size_t lanes = (size_t)lattice->block_count * PLIANT_LANES;
+    PLIANT_TAKE(arena, body->x, 3 * lanes);
+    PLIANT_TAKE(arena, body->v, 3 * lanes);
+    PLIANT_TAKE(arena, body->acceleration, 3 * lanes);
+    PLIANT_TAKE(arena, body->quaternion, 4 * lanes);
+    PLIANT_TAKE(arena, body->sites, (size_t)lattice->site_count * PLIANT_SITE_FLOATS);
+    PLIANT_TAKE(arena, body->plate_sums, 9 * (size_t)lattice->irregular.plate_capacity + 9);
+    PLIANT_TAKE(arena, body->weighed, 4 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->listed_turns, 16 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->scratch, body->worker_count);
+    for (int32_t k = 0; k < body->worker_count; k++) {
+        pliant_scratch none = {0};
+        lay_out_scratch(arena, lattice, arena->base ? &body->scratch[k] : &none);
+    }
+}
+
+pliant_body_def pliant_body_default(void)
+{
+    return (pliant_body_def){.rotation = {0, 0, 0, 1}, .damping_interval = 1, .thread_count = 1};
+}
+
+static pliant_status check_def(const pliant_body_def *def, pliant_error *err)
+{
+    const float *q = def->rotation;
+    const float length = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    if (!(length > 0.25f && length < 4))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected a rotation of length 1, found %g",
+                                sqrt((double)length));
+    if (!(fabsf(def->position.x) + fabsf(def->position.y) + fabsf(def->position.z) < 1e18f &&
+          fabsf(def->velocity.x) + fabsf(def->velocity.y) + fabsf(def->velocity.z) < 1e18f))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected a finite position and velocity");
+    if (!(def->damping >= 0 && def->damping <= 1 && def->rigid_damping >= 0 &&
+          def->rigid_damping <= 1))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected dampings of 0 to 1, found %g and %g",
+                                (double)def->damping, (double)def->rigid_damping);
+    if (def->damping_interval < 1)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected a damping interval of 1 or more, found %d",
+                                def->damping_interval);
+    if (!(def->strain_limit >= 0))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected a strain limit of 0 or more, found %g",
+                                (double)def->strain_limit);
+    if (def->thread_count < 1 || def->thread_count > PLIANT_TEAM_LIMIT)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "body: expected 1 to %d threads, found %d", PLIANT_TEAM_LIMIT,
+                                def->thread_count);
+    return PLIANT_OK;
+}
+
+static void place(pliant_body *body, const pliant_body_def *def)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const float *given = def->rotation;
+    const float scale = 1 / sqrtf(given[0] * given[0] + given[1] * given[1] + given[2] * given[2] +
+                                  given[3] * given[3]);
+    const float x = given[0] * scale, y = given[1] * scale, z = given[2] * scale,
+                w = given[3] * scale;
+    const float r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                           {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                           {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
+    const float from[3] = {def->position.x, def->position.y, def->position.z};
+    for (int32_t p = 0; p < lattice->particle_count; p++) {
+        const float *rest = lattice->rest + 3 * (size_t)p;
+        for (int c = 0; c < 3; c++)
+            body->x[lattice->slot[p] + PLIANT_LANES * c] =
+                from[c] + r[c][0] * rest[0] + r[c][1] * rest[1] + r[c][2] * rest[2];
+        pliant_body_set(body->v, lattice->slot[p], def->velocity);
+    }
+    const float q[4] = {x, y, z, w};
+    for (int32_t b = 0; b < lattice->block_count; b++)
+        for (int c = 0; c < 4; c++)
+            for (int k = 0; k < PLIANT_LANES; k++)
+                body->quaternion[((size_t)b * 4 + c) * PLIANT_LANES + k] = q[c];
+}
+
+pliant_status pliant_body_create(const pliant_lattice *lattice, const pliant_body_def *def,
+                                 pliant_body **result, pliant_error *err)
+{
+    if (!lattice || !result)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "pliant_body_create: expected a lattice and a place, found NULL");
+    const pliant_body_def usual = pliant_body_default();
+    if (!def) def = &usual;
+    pliant_status status = check_def(def, err);
+    if (status < 0) return status;
+    pliant_body *body = calloc(1, sizeof *body);
+    if (!body) return pliant_error_set(err, PLIANT_ERR_MEMORY, "body: no memory");
+    body->lattice = lattice;
+    body->worker_count = def->thread_count;
+    body->damping = def->damping;
+    body->damping_interval = def->damping_interval;
+    body->rigid_damping = def->rigid_damping;
+    body->strain_limit = def->strain_limit;
+    body->constants_of = lattice->constants_of;
+    body->constants = lattice->constants;
+    body->irregular = &lattice->irregular;
+    body->is_listed = lattice->exceptions.is_listed;
+    lay_out(&body->arena, body);
+    status = pliant_arena_reserve(&body->arena, err);
+    if (status < 0) goto done;
+    lay_out(&body->arena, body);
+    place(body, def);
+    if (def->thread_count > 1) status = pliant_team_create(def->thread_count, &body->team, err);
+done:
+    if (status < 0) {
+        pliant_body_destroy(body);
+        return status;
+    }
+    *result = body;
+    return PLIANT_OK;
+}
+
+void pliant_body_destroy(pliant_body *body)
+{
+    if (!body) return;
+    pliant_team_destroy(body->team);
+    pliant_arena_release(&body->arena);
+    free(body);
+}
+
+// ---- Step ----
+
+typedef struct match_task {
+    pliant_body *body;
+    float h;
+} match_task;
+
+static void gather_slab(void *context, int32_t z, int32_t worker)
+{
+    const match_task *task = context;
+    pliant_plates_gather(task->body, z, &task->body->scratch[worker]);
+}
+
+static void match_column(void *context, int32_t column, int32_t worker)
+{
+    const match_task *task = context;
+    pliant_column_match(task->body, column, &task->body->scratch[worker]);
+}
+
+static void scatter_slab(void *context, int32_t z, int32_t worker)
+{
+    const match_task *task = context;
+    pliant_plates_scatter(task->body, z, task->h, &task->body->scratch[worker]);
+}
+
+// The middle of some particles: the same whatever the number of threads.
+static void find_origin(pliant_body *body)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t step = lattice->particle_count / 64 + 1;
+    double sum[3] = {0};
+    int32_t count = 0;
+    for (int32_t p = 0; p < lattice->particle_count; p += step, count++)
+        for (int c = 0; c < 3; c++) sum[c] += body->x[lattice->slot[p] + PLIANT_LANES * c];
+    for (int c = 0; c < 3; c++) body->origin[c] = (float)(sum[c] / count);
+}
+
+void pliant_body_match(pliant_body *body, float h)
+{
+    match_task task = {body, h};
+    find_origin(body);
+    const int64_t start = pliant_clock_ns();
+    pliant_team_run(body->team, body->lattice->dims[2], gather_slab, &task);
+    const int64_t gathered = pliant_clock_ns();
+    pliant_team_run(body->team, body->lattice->column_count, match_column, &task);
+    const int64_t matched = pliant_clock_ns();
+    pliant_team_run(body->team, body->lattice->dims[2], scatter_slab, &task);
+    const int64_t scattered = pliant_clock_ns();
+    body->times.plates = gathered - start;
+    body->times.regions = matched - gathered;
+    body->times.goals = scattered - matched;
+    if (body->has_forces) {
+        memset(body->acceleration, 0,
+               (size_t)body->lattice->block_count * 3 * PLIANT_LANES * sizeof(float));
+        body->has_forces = 0;
+    }
+}
+
+void pliant_body_move(pliant_body *body, float h)
+{
+    const int64_t start = pliant_clock_ns();
+    const size_t count = (size_t)body->lattice->block_count * 3 * PLIANT_LANES;
+    for (size_t i = 0; i < count; i++) body->x[i] += h * body->v[i];
+    body->step_count++;
+    body->times.move = pliant_clock_ns() - start;
+}
+
+pliant_status pliant_body_step(pliant_body *body, float h)
+{
+    if (!(h > 0) || !isfinite(h)) return PLIANT_ERR_ARGUMENT;
+    pliant_body_match(body, h);
+    pliant_body_move(body, h);
+    return PLIANT_OK;
+}

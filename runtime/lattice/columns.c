@@ -1,0 +1,305 @@
+// columns.c: shape matching of the regions of one column of blocks.
+#include "lattice/columns.h"
+
+#include "lattice/plates.h"
+#include "lattice/polar.h"
+#include "lattice/polar_block.h"
+#include "lattice/window.h"
+#include "pliant/vector_clones.h"
+
+// Of a region: c, p, a, b, each 3 numbers. A step of one cell along x, y, z adds a, b, c to the
+// goal p of the region's own particle.
+#define TURN_FLOATS (12 * PLIANT_LANES)
+
+// The places of c, p, a, b in a turn, and of b, p, a in a site on the way back.
+enum { TURN_C = 0, TURN_P = 3, TURN_A = 6, TURN_B = 9, SITE_B = 0, SITE_P = 3, SITE_A = 6 };
+
+static const float zero_turn[TURN_FLOATS];
+
+// ---- Sums of irregular regions ----
+
+// What makes a block's window sums those of its regions: sums = keep * window + more, S, X, Y, Z.
+typedef struct repair {
+    float keep[PLIANT_LANES];
+    float more[12][PLIANT_LANES];
+} repair;
+
+_Static_assert(sizeof(repair) == 13 * PLIANT_LANES * sizeof(float), "scratch is sized by this");
+
+static repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
+{
+    repair *all = (repair *)(void *)scratch->repairs;
+    if (scratch->repair_of[s] >= 0) return &all[scratch->repair_of[s]];
+    repair *r = &all[scratch->repair_of[s] = (*count)++];
+    memset(r->more, 0, sizeof r->more);
+    for (int k = 0; k < PLIANT_LANES; k++) r->keep[k] = 1;
+    return r;
+}
+
+// Less the particles that a region lacks.
+PLIANT_INLINE void repair_listed(const pliant_body *body, int32_t k, repair *r, int32_t lane)
+{
+    const pliant_exceptions *e = &body->lattice->exceptions;
+    pliant_f4 sum = {0}, x = {0}, y = {0}, z = {0};
+    for (int32_t i = e->first[k]; i < e->first[k + 1]; i++) {
+        const pliant_exception *item = &e->items[i];
+        const pliant_f4 value = pliant_f4_load(body->weighed + 4 * (size_t)item->other);
+        sum += value;
+        x += value * (float)item->step[0];
+        y += value * (float)item->step[1];
+        z += value * (float)item->step[2];
+    }
+    for (int c = 0; c < 3; c++) {
+        r->more[c][lane] = -sum[c];
+        r->more[3 + c][lane] = -x[c];
+        r->more[6 + c][lane] = -y[c];
+        r->more[9 + c][lane] = -z[c];
+    }
+}
+
+// Less or instead: the sum of the region's parts.
+static void repair_parts(const pliant_body *body, const pliant_region_node *node,
+                         const pliant_part *parts, const float *sites, repair *r)
+{
+    const int32_t w = body->lattice->half_width;
+    float total[12] = {0};
+    for (int32_t i = 0; i < node->part_count; i++) {
+        const float *site = sites + (size_t)parts[i].plane * PLIANT_SITE_FLOATS + node->lane;
+        const float *plate =
+            body->plate_sums + 9 * (size_t)(parts[i].plate < 0 ? 0 : parts[i].plate);
+        const float dz = (float)(parts[i].plane - w);
+        float part[9];
+        for (int f = 0; f < 9; f++) part[f] = parts[i].plate < 0 ? site[8 * f] : plate[f];
+        for (int f = 0; f < 9; f++) total[f] += part[f];
+        for (int f = 0; f < 3; f++) total[9 + f] += dz * part[f];
+    }
+    r->keep[node->lane] = node->sign < 0 ? 1 : 0;
+    for (int f = 0; f < 12; f++) r->more[f][node->lane] = (float)node->sign * total[f];
+}
+
+PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_lattice_column *c = &lattice->columns[column];
+    const pliant_exceptions *e = &lattice->exceptions;
+    const pliant_irregular *irregular = body->irregular;
+    const int32_t width = 2 * lattice->half_width + 1;
+    int32_t count = 0;
+    for (int32_t s = 0; s < c->length; s++) scratch->repair_of[s] = -1;
+    for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
+        const int32_t k = e->column_items[i];
+        if (!body->is_listed[k]) continue;
+        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
+        repair_listed(body, k, repair_at(scratch, at[2] - c->z, &count), at[0] % PLIANT_LANES);
+    }
+    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
+        const pliant_region_node *node = &irregular->regions[n];
+        const int32_t s = node->z - c->z;
+        repair_parts(body, node, irregular->parts + (size_t)n * width,
+                     body->sites + (size_t)(c->first_site + s) * PLIANT_SITE_FLOATS,
+                     repair_at(scratch, s, &count));
+    }
+}
+
+PLIANT_INLINE void apply_repair(const pliant_scratch *scratch, int32_t s, float *sums)
+{
+    if (scratch->repair_of[s] < 0) return;
+    const repair *r = (const repair *)(const void *)scratch->repairs + scratch->repair_of[s];
+    const pliant_f8 keep = pliant_f8_load(r->keep);
+    for (int f = 0; f < 12; f++)
+        pliant_f8_store(sums + 8 * f,
+                        keep * pliant_f8_load(sums + 8 * f) + pliant_f8_load(r->more[f]));
+}
+
+// ---- Matching ----
+
+// c_r (LSM-9), A_r (LSM-11), R_r, T_r of the eight regions of a block:
+//     A_r = sum of m~ x d^T - (sum of m~ x) d0^T, d = x0 - x0_r in cells, d0 = c0_r - x0_r
+PLIANT_INLINE void match_block(pliant_body *body, int32_t block, const float *sums, float *turn)
+{
+    const pliant_block_constants *constants = &body->constants[body->constants_of[block]];
+    const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
+    const pliant_f8 inverse_mass = pliant_f8_load(constants->inverse_mass);
+    const pliant_f8 cell = pliant_f8_all(body->lattice->cell_size);
+    float a[9 * PLIANT_LANES], rotation[9 * PLIANT_LANES];
+    pliant_f8 offset[3];
+    for (int d = 0; d < 3; d++) offset[d] = pliant_f8_load(constants->offset[d]);
+    for (int c = 0; c < 3; c++) {
+        const pliant_f8 sum = pliant_f8_load(sums + 8 * c);
+        for (int d = 0; d < 3; d++)
+            pliant_f8_store(a + 8 * (3 * c + d),
+                            is_particle *
+                                (pliant_f8_load(sums + 8 * (3 + 3 * d + c)) - sum * offset[d]));
+    }
+    float *q = body->quaternion + (size_t)block * 4 * PLIANT_LANES;
+    int32_t missed[PLIANT_LANES];
+    if (pliant_polar_try(1, a, q, rotation, missed)) pliant_polar_finish(a, missed, q, rotation);
+    const pliant_f8 scale = is_particle * cell;
+    for (int c = 0; c < 3; c++) {
+        pliant_f8 goal = pliant_f8_load(sums + 8 * c) * inverse_mass;
+        pliant_f8 axis[3];
+        for (int d = 0; d < 3; d++) {
+            axis[d] = scale * pliant_f8_load(rotation + 8 * (3 * c + d));
+            goal -= offset[d] * axis[d];
+        }
+        pliant_f8_store(turn + 8 * (TURN_A + c), axis[0]);
+        pliant_f8_store(turn + 8 * (TURN_B + c), axis[1]);
+        pliant_f8_store(turn + 8 * (TURN_C + c), axis[2]);
+        pliant_f8_store(turn + 8 * (TURN_P + c), is_particle * goal);
+    }
+}
+
+// Sums over regions along z (LSM-7), and what is made of them.
+PLIANT_INLINE void match_regions(pliant_body *body, int32_t column, float *turns,
+                                 pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_lattice_column *c = &lattice->columns[column];
+    const int32_t w = lattice->half_width;
+    const float *sites = body->sites + (size_t)c->first_site * PLIANT_SITE_FLOATS;
+    for (int32_t s = 0; s < c->length + 2 * w; s++)
+        scratch->strip[s] = sites + (size_t)s * PLIANT_SITE_FLOATS;
+    pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+    for (int32_t s = 0; s < c->length; s++) {
+        float *turn = turns + (size_t)s * TURN_FLOATS;
+        const int32_t block =
+            lattice->block_at[((size_t)(c->z + s) * lattice->dims[1] + c->y) * lattice->row_blocks +
+                              c->x];
+        if (block < 0 && w == 1) {
+            memset(turn, 0, TURN_FLOATS * sizeof *turn);
+            continue;
+        }
+        pliant_f8 sum[9], moment[3];
+        pliant_window_next(&window, s, 3, 6, sum, moment);
+        if (block < 0) {
+            memset(turn, 0, TURN_FLOATS * sizeof *turn);
+            continue;
+        }
+        float sums[12 * PLIANT_LANES];
+        for (int f = 0; f < 9; f++) pliant_f8_store(sums + 8 * f, sum[f]);
+        for (int f = 0; f < 3; f++) pliant_f8_store(sums + 8 * (9 + f), moment[f]);
+        apply_repair(scratch, s, sums);
+        match_block(body, block, sums, turn);
+    }
+}
+
+// T_r of listed regions, for those who leave it out.
+static void list_turns(pliant_body *body, int32_t column, const float *turns)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_exceptions *e = &lattice->exceptions;
+    for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
+        const int32_t k = e->column_items[i];
+        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
+        const float *turn = turns + (size_t)(at[2] - lattice->columns[column].z) * TURN_FLOATS +
+                            at[0] % PLIANT_LANES;
+        float *to = body->listed_turns + 16 * (size_t)k;
+        for (int c = 0; c < 3; c++) {
+            to[c] = body->is_listed[k] ? turn[8 * (TURN_P + c)] : 0;
+            to[4 + c] = body->is_listed[k] ? turn[8 * (TURN_A + c)] : 0;
+            to[8 + c] = body->is_listed[k] ? turn[8 * (TURN_B + c)] : 0;
+            to[12 + c] = body->is_listed[k] ? turn[8 * (TURN_C + c)] : 0;
+        }
+    }
+}
+
+// Regions made of their parts alone leave the windows; all that are made of parts are set aside.
+static void set_apart(const pliant_body *body, int32_t column, float *turns,
+                      pliant_scratch *scratch)
+{
+    const pliant_irregular *irregular = body->irregular;
+    float *apart = scratch->apart;
+    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
+        const pliant_region_node *node = &irregular->regions[n];
+        float *turn =
+            turns + (size_t)(node->z - body->lattice->columns[column].z) * TURN_FLOATS + node->lane;
+        for (int f = 0; f < 12; f++, apart++) {
+            *apart = turn[8 * f];
+            if (node->sign > 0) turn[8 * f] = 0;
+        }
+    }
+}
+
+// Back along z: p of a plate is the sum of p + (z_plate - z_r) c.
+PLIANT_INLINE void spread_regions(pliant_body *body, int32_t column, const float *turns,
+                                  pliant_scratch *scratch)
+{
+    const pliant_lattice_column *c = &body->lattice->columns[column];
+    const int32_t w = body->lattice->half_width;
+    for (int32_t s = 0; s < 2 * w; s++)
+        scratch->strip[s] = scratch->strip[2 * w + c->length + s] = zero_turn;
+    for (int32_t s = 0; s < c->length; s++)
+        scratch->strip[2 * w + s] = turns + (size_t)s * TURN_FLOATS;
+    pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+    float *site = body->sites + (size_t)c->first_site * PLIANT_SITE_FLOATS;
+    for (int32_t s = 0; s < c->length + 2 * w; s++, site += PLIANT_SITE_FLOATS) {
+        pliant_f8 sum[12], moment[3];
+        pliant_window_next(&window, s, 3, 9, sum, moment);
+        for (int k = 0; k < 3; k++) {
+            pliant_f8_store(site + 8 * (SITE_P + k), sum[TURN_P + k] - moment[k]);
+            pliant_f8_store(site + 8 * (SITE_A + k), sum[TURN_A + k]);
+            pliant_f8_store(site + 8 * (SITE_B + k), sum[TURN_B + k]);
+        }
+    }
+}
+
+// What regions made of parts hand to them: to whole planes, and to restricted plates.
+static void spread_apart(pliant_body *body, int32_t column, const pliant_scratch *scratch)
+{
+    const pliant_irregular *irregular = body->irregular;
+    const pliant_lattice_column *c = &body->lattice->columns[column];
+    const int32_t w = body->lattice->half_width, width = 2 * w + 1;
+    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next)
+        for (int32_t i = 0; i < irregular->regions[n].part_count; i++) {
+            const int32_t plate = irregular->parts[(size_t)n * width + i].plate;
+            if (plate >= 0) memset(body->plate_sums + 9 * (size_t)plate, 0, 9 * sizeof(float));
+        }
+    const float *turn = scratch->apart;
+    for (int32_t n = irregular->column_head[column]; n >= 0;
+         n = irregular->regions[n].next, turn += 12) {
+        const pliant_region_node *node = &irregular->regions[n];
+        const float sign = (float)node->sign;
+        for (int32_t i = 0; i < node->part_count; i++) {
+            const pliant_part *part = &irregular->parts[(size_t)n * width + i];
+            const float dz = (float)(part->plane - w);
+            float *to = part->plate >= 0
+                            ? body->plate_sums + 9 * (size_t)part->plate
+                            : body->sites +
+                                  (size_t)(c->first_site + node->z - c->z + part->plane) *
+                                      PLIANT_SITE_FLOATS +
+                                  node->lane;
+            const int32_t apart = part->plate >= 0 ? 1 : PLIANT_LANES;
+            for (int k = 0; k < 3; k++) {
+                to[apart * (SITE_P + k)] += sign * (turn[TURN_P + k] + dz * turn[TURN_C + k]);
+                to[apart * (SITE_A + k)] += sign * turn[TURN_A + k];
+                to[apart * (SITE_B + k)] += sign * turn[TURN_B + k];
+            }
+        }
+    }
+}
+
+// Sites outside the lattice hold nothing; what the last step left there goes.
+static void clear_outside(pliant_body *body, int32_t column)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_lattice_column *c = &lattice->columns[column];
+    const int32_t w = lattice->half_width;
+    for (int32_t s = 0; s < c->length + 2 * w; s++) {
+        const int32_t z = c->z - w + s;
+        if (z < 0 || z >= lattice->dims[2] || lattice->slab_first[z] == lattice->slab_first[z + 1])
+            memset(body->sites + (size_t)(c->first_site + s) * PLIANT_SITE_FLOATS, 0,
+                   PLIANT_SITE_FLOATS * sizeof(float));
+    }
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_column_match(pliant_body *body, int32_t column, pliant_scratch *scratch)
+{
+    clear_outside(body, column);
+    find_repairs(body, column, scratch);
+    match_regions(body, column, scratch->turns, scratch);
+    list_turns(body, column, scratch->turns);
+    set_apart(body, column, scratch->turns, scratch);
+    spread_regions(body, column, scratch->turns, scratch);
+    spread_apart(body, column, scratch);
+}

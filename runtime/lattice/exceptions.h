@@ -1,0 +1,30 @@
+// exceptions.h: what a region lacks of its window, particle by particle.
+//
+// Most irregular regions lack a few particles at the rim of their window, which are near but more
+// than w steps away (a ball of 57,000 particles: one region in eight at w = 1, 4 particles each;
+// two in five at w = 8, 12 each). Their sums are the window's minus those few. Lacking is mutual,
+// so that one list serves both ways: sums of a region leave out the particles of its list, and a
+// particle's goal leaves out the regions of its list. Regions that lack more are made of parts
+// (irregular.h).
+#pragma once
+
+#include "pliant/arena.h"
+#include "pliant/regions.h"
+
+#define PLIANT_EXCEPTION_LIMIT 64  // of one region; see bench_lattice
+
+typedef struct pliant_exception {
+    int32_t other;   // index of the particle that is lacked, and whose region lacks this one
+    int8_t step[4];  // its place less this one's; the last is 0
+} pliant_exception;
+
+typedef struct pliant_exceptions {
+    int32_t count;          // particles with irregular regions, ascending
+    int32_t *particle;      // shape [count]
+    int32_t *slab_first;    // shape [slabs + 1]: the first of each slab
+    int32_t *column_first;  // shape [columns + 1] into `column_items`
+    int32_t *column_items;  // shape [count]: those of each column, ascending
+    int32_t *first;         // shape [count + 1] into `items`
+    pliant_exception *items;
+    uint8_t *is_listed;  // shape [count]: 1: the region's sums are mended by its list
+} pliant_exceptions;

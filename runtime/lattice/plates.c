@@ -1,0 +1,335 @@
+// plates.c: sums over bars and plates of particles, and the same way back to the particles.
+#include "lattice/plates.h"
+
+#include "lattice/window.h"
+#include "pliant/vector_clones.h"
+
+static const float zero_row[9 * PLIANT_LANES];
+
+// ---- Forward ----
+
+// m~ (x - origin) of the particles of row (y, z), in three padded rows.
+PLIANT_INLINE void load_row(const pliant_body *body, int32_t y, int32_t z, float *rows)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    const int32_t *block_at =
+        lattice->block_at + ((size_t)z * lattice->dims[1] + y) * lattice->row_blocks;
+    for (int32_t k = 0; k < lattice->row_blocks; k++) {
+        const int32_t block = block_at[k];
+        float *to = rows + PLIANT_ROW_PAD + 8 * k;
+        if (block < 0) {
+            for (int c = 0; c < 3; c++) pliant_f8_store(to + c * length, (pliant_f8){0});
+            continue;
+        }
+        const pliant_f8 share = pliant_f8_load(body->constants[body->constants_of[block]].share);
+        const float *x = body->x + (size_t)block * 3 * PLIANT_LANES;
+        for (int c = 0; c < 3; c++)
+            pliant_f8_store(to + c * length,
+                            share * (pliant_f8_load(x + 8 * c) - pliant_f8_all(body->origin[c])));
+    }
+}
+
+static int32_t row_is_empty(const pliant_lattice *lattice, int32_t y, int32_t z)
+{
+    const int32_t *block_at =
+        lattice->block_at + ((size_t)z * lattice->dims[1] + y) * lattice->row_blocks;
+    for (int32_t k = 0; k < lattice->row_blocks; k++)
+        if (block_at[k] >= 0) return 0;
+    return 1;
+}
+
+// Bars (LSM-4, 5): sums and moments along x, shape [row_blocks][dims y][6][8].
+PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t *range = lattice->slab_rows + 2 * z;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    const size_t apart = (size_t)lattice->dims[1] * 6 * PLIANT_LANES;
+    for (int32_t y = range[0]; y < range[1]; y++) {
+        float *bars = scratch->bars + (size_t)y * 6 * PLIANT_LANES;
+        if (row_is_empty(lattice, y, z)) {
+            for (int32_t k = 0; k < lattice->row_blocks; k++)
+                memset(bars + apart * k, 0, 6 * PLIANT_LANES * sizeof *bars);
+            continue;
+        }
+        load_row(body, y, z, scratch->rows);
+        for (int c = 0; c < 3; c++)
+            pliant_window_along(scratch->rows + c * length + PLIANT_ROW_PAD, lattice->row_blocks,
+                                lattice->half_width, scratch->doubled, bars + 8 * c,
+                                bars + 8 * (3 + c), apart);
+    }
+}
+
+// Plates (LSM-4, 6): sums and moments along y, into the slab's sites.
+PLIANT_INLINE void sum_plates(pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t w = lattice->half_width, ny = lattice->dims[1];
+    const int32_t *range = lattice->slab_rows + 2 * z;
+    const int32_t first = range[0] - w, last = range[1] + w;  // plates that hold anything
+    for (int32_t k = 0; k < lattice->row_blocks; k++) {
+        const float *bars = scratch->bars + (size_t)k * ny * 6 * PLIANT_LANES;
+        for (int32_t y = first - w; y < last + w; y++)
+            scratch->strip[y - (first - w)] =
+                y < range[0] || y >= range[1] ? zero_row : bars + (size_t)y * 6 * PLIANT_LANES;
+        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+        for (int32_t y = 0; y < ny; y++) {
+            const int32_t column = lattice->column_at[y * lattice->row_blocks + k];
+            float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
+            if (site && (y < first || y >= last))
+                memset(site, 0, PLIANT_SITE_FLOATS * sizeof *site);
+        }
+        for (int32_t y = first; y < last; y++) {
+            const int32_t column =
+                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
+            float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
+            if (!site && w == 1) continue;
+            pliant_f8 sums[6], moments[3];
+            pliant_window_next(&window, y - first, 3, 3, sums, moments);
+            if (!site) continue;
+            for (int f = 0; f < 6; f++) pliant_f8_store(site + 8 * f, sums[f]);
+            for (int f = 0; f < 3; f++) pliant_f8_store(site + 8 * (6 + f), moments[f]);
+        }
+    }
+}
+
+// m~ (x - origin) of the particle at (x, y, z); there is one.
+static void weigh(const pliant_body *body, int32_t x, int32_t y, int32_t z, float *value)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t lane = x % PLIANT_LANES;
+    const int32_t block =
+        lattice
+            ->block_at[((size_t)z * lattice->dims[1] + y) * lattice->row_blocks + x / PLIANT_LANES];
+    const float share = body->constants[body->constants_of[block]].share[lane];
+    const float *at = body->x + (size_t)block * 3 * PLIANT_LANES + lane;
+    for (int c = 0; c < 3; c++) value[c] = share * (at[8 * c] - body->origin[c]);
+}
+
+// Restricted plates: whole rows are bars, the others are added particle by particle.
+static void sum_restricted(pliant_body *body, int32_t z, const pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_irregular *irregular = body->irregular;
+    const int32_t w = lattice->half_width, width = 2 * w + 1;
+    for (int32_t n = irregular->slab_head[z]; n >= 0; n = irregular->plates[n].next) {
+        const pliant_plate_node *plate = &irregular->plates[n];
+        const pliant_row *rows = irregular->rows + (size_t)n * width;
+        float sums[9] = {0};
+        for (int32_t i = 0; i < plate->row_count; i++) {
+            const int32_t y = plate->y + rows[i].row - w;
+            float row[6] = {0};
+            if (rows[i].mask & PLIANT_ROW_WHOLE) {
+                const float *bar =
+                    scratch->bars +
+                    (((size_t)(plate->x / PLIANT_LANES) * lattice->dims[1] + y) * 6) *
+                        PLIANT_LANES +
+                    plate->x % PLIANT_LANES;
+                for (int f = 0; f < 6; f++) row[f] = bar[8 * f];
+            } else {
+                for (uint32_t rest = rows[i].mask; rest; rest &= rest - 1) {
+                    const int32_t dx = __builtin_ctz(rest) - w;
+                    float value[3];
+                    weigh(body, plate->x + dx, y, z, value);
+                    for (int c = 0; c < 3; c++) row[c] += value[c], row[3 + c] += dx * value[c];
+                }
+            }
+            for (int f = 0; f < 6; f++) sums[f] += row[f];
+            for (int c = 0; c < 3; c++) sums[6 + c] += (rows[i].row - w) * row[c];
+        }
+        memcpy(body->plate_sums + 9 * (size_t)n, sums, sizeof sums);
+    }
+}
+
+// The slab's particles that others' regions may lack.
+static void weigh_listed(pliant_body *body, int32_t z)
+{
+    const pliant_exceptions *e = &body->lattice->exceptions;
+    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
+        const int32_t slot = body->lattice->slot[e->particle[k]];
+        const int32_t block = slot / (3 * PLIANT_LANES);
+        const float share = body->constants[body->constants_of[block]].share[slot % PLIANT_LANES];
+        float *to = body->weighed + 4 * (size_t)k;
+        for (int c = 0; c < 3; c++)
+            to[c] = share * (body->x[slot + PLIANT_LANES * c] - body->origin[c]);
+    }
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_plates_gather(pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    sum_bars(body, z, scratch);
+    sum_plates(body, z, scratch);
+    sum_restricted(body, z, scratch);
+    weigh_listed(body, z);
+}
+
+// ---- Back ----
+
+// What a bar holds, in six padded rows for each row y of the slab.
+PLIANT_INLINE float *bar_rows(const pliant_lattice *lattice, pliant_scratch *scratch, int32_t y,
+                              int32_t z)
+{
+    return scratch->rows +
+           (size_t)(y - lattice->slab_rows[2 * z]) * 6 * pliant_row_length(lattice->row_blocks);
+}
+
+// From plates to bars: p of a bar is the sum of p + (y_bar - y) b.
+PLIANT_INLINE void spread_plates(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t w = lattice->half_width, ny = lattice->dims[1];
+    const int32_t *range = lattice->slab_rows + 2 * z;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (int32_t k = 0; k < lattice->row_blocks; k++) {
+        for (int32_t y = range[0] - w; y < range[1] + w; y++) {
+            const int32_t column =
+                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
+            const float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
+            scratch->strip[y - (range[0] - w)] = site ? site : zero_row;
+        }
+        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+        for (int32_t y = range[0]; y < range[1]; y++) {
+            // b comes first, it has the moments; a plate's y is less than the bar's by what the
+            // moment counts.
+            pliant_f8 sums[9], moments[3];
+            pliant_window_next(&window, y - range[0], 3, 6, sums, moments);
+            float *rows = bar_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD + 8 * k;
+            for (int c = 0; c < 3; c++) {
+                pliant_f8_store(rows + c * length, sums[3 + c] - moments[c]);
+                pliant_f8_store(rows + (3 + c) * length, sums[6 + c]);
+            }
+        }
+    }
+}
+
+// From restricted plates to their whole rows' bars.
+static void spread_restricted(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_irregular *irregular = body->irregular;
+    const int32_t w = lattice->half_width, width = 2 * w + 1;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (int32_t n = irregular->slab_head[z]; n >= 0; n = irregular->plates[n].next) {
+        const pliant_plate_node *plate = &irregular->plates[n];
+        const pliant_row *rows = irregular->rows + (size_t)n * width;
+        const float *sums = body->plate_sums + 9 * (size_t)n;
+        for (int32_t i = 0; i < plate->row_count; i++) {
+            if (!(rows[i].mask & PLIANT_ROW_WHOLE)) continue;
+            const float dy = (float)(rows[i].row - w);
+            float *bar = bar_rows(lattice, scratch, plate->y + rows[i].row - w, z) +
+                         PLIANT_ROW_PAD + plate->x;
+            for (int c = 0; c < 3; c++) {
+                bar[c * length] += sums[3 + c] + dy * sums[c];
+                bar[(3 + c) * length] += sums[6 + c];
+            }
+        }
+    }
+}
+
+// From bars to particles: the sums of p and of the moments of a, over each row's first three rows.
+PLIANT_INLINE void spread_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const int32_t *range = lattice->slab_rows + 2 * z, blocks = lattice->row_blocks;
+    const size_t length = pliant_row_length(blocks);
+    float *sum = scratch->bars, *moment = sum + length, *unused = moment + length;
+    for (int32_t y = range[0]; y < range[1]; y++) {
+        if (row_is_empty(lattice, y, z)) continue;
+        float *rows = bar_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD;
+        for (int c = 0; c < 3; c++) {
+            pliant_window_along(rows + (3 + c) * length, blocks, lattice->half_width,
+                                scratch->doubled, unused, moment, 8);
+            pliant_window_along(rows + c * length, blocks, lattice->half_width, scratch->doubled,
+                                sum, NULL, 8);
+            for (int32_t k = 0; k < blocks; k++)
+                pliant_f8_store(rows + c * length + 8 * k,
+                                pliant_f8_load(sum + 8 * k) - pliant_f8_load(moment + 8 * k));
+        }
+    }
+}
+
+// From restricted plates to the particles of their restricted rows.
+static void spread_masks(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_irregular *irregular = body->irregular;
+    const int32_t w = lattice->half_width, width = 2 * w + 1;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (int32_t n = irregular->slab_head[z]; n >= 0; n = irregular->plates[n].next) {
+        const pliant_plate_node *plate = &irregular->plates[n];
+        const pliant_row *rows = irregular->rows + (size_t)n * width;
+        const float *sums = body->plate_sums + 9 * (size_t)n;
+        for (int32_t i = 0; i < plate->row_count; i++) {
+            if (rows[i].mask & PLIANT_ROW_WHOLE) continue;
+            const float dy = (float)(rows[i].row - w);
+            float *row = bar_rows(lattice, scratch, plate->y + rows[i].row - w, z) +
+                         PLIANT_ROW_PAD + plate->x - w;
+            for (uint32_t rest = rows[i].mask; rest; rest &= rest - 1) {
+                const int32_t bit = __builtin_ctz(rest);
+                for (int c = 0; c < 3; c++)
+                    row[c * length + bit] += sums[3 + c] + dy * sums[c] + (bit - w) * sums[6 + c];
+            }
+        }
+    }
+}
+
+// A particle's goal leaves out the regions that lack it: T_r of each, applied to its place.
+PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const pliant_exceptions *e = &lattice->exceptions;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
+        pliant_f4 total = {0};
+        for (int32_t i = e->first[k]; i < e->first[k + 1]; i++) {
+            const pliant_exception *item = &e->items[i];
+            const float *turn = body->listed_turns + 16 * (size_t)item->other;
+            total += pliant_f4_load(turn) - pliant_f4_load(turn + 4) * (float)item->step[0] -
+                     pliant_f4_load(turn + 8) * (float)item->step[1] -
+                     pliant_f4_load(turn + 12) * (float)item->step[2];
+        }
+        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
+        float *row = bar_rows(lattice, scratch, at[1], z) + PLIANT_ROW_PAD + at[0];
+        for (int c = 0; c < 3; c++) row[c * length] -= total[c];
+    }
+}
+
+PLIANT_INLINE void accelerate(pliant_body *body, int32_t z, float h, pliant_scratch *scratch)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    const pliant_f8 rate = pliant_f8_all(1 / h), step = pliant_f8_all(h);
+    const float gravity[3] = {body->gravity.x, body->gravity.y, body->gravity.z};
+    for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
+        const int32_t *place = lattice->block_place + 3 * (size_t)b;
+        const pliant_block_constants *constants = &body->constants[body->constants_of[b]];
+        const pliant_f8 inverse = pliant_f8_load(constants->inverse_size);
+        const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
+        const float *goal = bar_rows(lattice, scratch, place[1], z) + PLIANT_ROW_PAD + 8 * place[0];
+        const float *x = body->x + (size_t)b * 3 * PLIANT_LANES;
+        const float *a = body->acceleration + (size_t)b * 3 * PLIANT_LANES;
+        float *v = body->v + (size_t)b * 3 * PLIANT_LANES;
+        for (int c = 0; c < 3; c++) {
+            const pliant_f8 offset = pliant_f8_load(x + 8 * c) - pliant_f8_all(body->origin[c]);
+            pliant_f8 pull = pliant_f8_all(gravity[c]);
+            if (body->has_forces) pull += pliant_f8_load(a + 8 * c);
+            const pliant_f8 change =
+                rate * (inverse * pliant_f8_load(goal + c * length) - offset) + step * pull;
+            pliant_f8_store(v + 8 * c, pliant_f8_load(v + 8 * c) + is_particle * change);
+        }
+    }
+}
+
+PLIANT_VECTOR_CLONES
+void pliant_plates_scatter(pliant_body *body, int32_t z, float h, pliant_scratch *scratch)
+{
+    if (body->lattice->slab_first[z] == body->lattice->slab_first[z + 1]) return;
+    spread_plates(body, z, scratch);
+    spread_restricted(body, z, scratch);
+    spread_bars(body, z, scratch);
+    spread_masks(body, z, scratch);
+    leave_out(body, z, scratch);
+    accelerate(body, z, h, scratch);
+}
