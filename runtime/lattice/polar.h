@@ -20,5 +20,10 @@
 // A lane's result does not depend on its neighbours, bit for bit.
 void pliant_polar_blocks(int32_t block_count, const float *a, float *q, float *rotation);
 
+static inline void pliant_polar_block(const float *a, float *q, float *rotation)
+{
+    pliant_polar_blocks(1, a, q, rotation);
+}
+
 // One block's lanes that pliant_polar_try (polar_block.h) left: missed[lane] != 0, q their start.
 void pliant_polar_finish(const float *a, const int32_t missed[8], float *q, float *rotation);
