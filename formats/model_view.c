@@ -4,6 +4,7 @@
 #include "pliant/error.h"
 #include "pliant/utf8.h"
 #include "bind.h"
+#include "lattice_check.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -15,7 +16,7 @@ typedef struct binding {
     const pliant_reader *reader;
     const char *name;
     pliant_model_view *view;
-    int is_there[3];  // by pliant_presence
+    int is_there[PLIANT_PRESENCE_COUNT];
     uint64_t extent[PLIANT_EXTENT_COUNT];
 #define DECLARE(field, ...) const pliant_section *field;
     struct {
@@ -46,6 +47,8 @@ static pliant_status find_sections(binding *b, pliant_error *err)
 static pliant_status count_all(binding *b, pliant_error *err)
 {
     pliant_model_view *v = b->view;
+    int32_t batches_1 = 0;
+    // Sections that are absent count nothing.
     const struct {
         const pliant_section *section;
         int32_t least, limit, *count;
@@ -57,19 +60,54 @@ static pliant_status count_all(binding *b, pliant_error *err)
          PLIANT_EXTENT_LEVELS},
         {b->section.free_nodes, 1, PLIANT_VERTEX_LIMIT, &v->free_count, PLIANT_EXTENT_FREE},
         {b->section.fixed_nodes, 0, PLIANT_VERTEX_LIMIT, &v->fixed_count, PLIANT_EXTENT_FIXED},
+        {b->section.lattice_cells, 1, PLIANT_LATTICE_LIMIT, &v->lattice_cell_count,
+         PLIANT_EXTENT_CELLS},
+        {b->section.lattice_particles, 8, PLIANT_LATTICE_LIMIT, &v->lattice_particle_count,
+         PLIANT_EXTENT_PARTICLES},
+        {b->section.lattice_region_nodes, 0, PLIANT_LATTICE_LIMIT, &v->lattice_region_node_count,
+         PLIANT_EXTENT_REGION_NODES},
+        {b->section.lattice_plate_nodes, 0, PLIANT_VERTEX_LIMIT, &v->lattice_plate_node_count,
+         PLIANT_EXTENT_PLATE_NODES},
+        {b->section.lattice_batch_face_offset, 2, PLIANT_FACE_LIMIT + 1, &batches_1,
+         PLIANT_EXTENT_BATCHES_1},
+        {b->section.lattice_batch_points, 8, INT32_MAX, &v->lattice_batch_point_count,
+         PLIANT_EXTENT_BATCH_POINTS},
     };
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        if (!counts[i].section) continue;
         const pliant_status status = pliant_bind_count(
             b->reader, counts[i].section, counts[i].least, counts[i].limit, counts[i].count, err);
         if (status < 0) return status;
         b->extent[counts[i].extent] = (uint64_t)*counts[i].count;
     }
+    if (batches_1 > 0) v->lattice_batch_count = batches_1 - 1;
     b->extent[PLIANT_EXTENT_1] = 1;
     b->extent[PLIANT_EXTENT_2] = 2;
     b->extent[PLIANT_EXTENT_3] = 3;
     b->extent[PLIANT_EXTENT_8] = 8;
     b->extent[PLIANT_EXTENT_OFFSETS] = (uint64_t)v->level_count + 1;
     b->extent[PLIANT_EXTENT_TEXT] = v->provenance_bytes = b->section.provenance->shape[0];
+    return PLIANT_OK;
+}
+
+// The half-width says how long the nodes of regions and plates are.
+static pliant_status count_lattice(binding *b, pliant_error *err)
+{
+    if (!b->is_there[PLIANT_WITH_LATTICE]) return PLIANT_OK;
+    const uint64_t shape[3] = {PLIANT_LATTICE_SUMMARY_COUNT, 1, 1};
+    const pliant_status status =
+        pliant_bind_shape(b->reader, b->section.lattice_summary, shape, err);
+    if (status < 0) return status;
+    const int32_t w = b->view->lattice_summary[PLIANT_LATTICE_HALF_WIDTH];
+    if (w < 1 || w > PLIANT_LATTICE_WIDTH_LIMIT)
+        return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                "%s: /lattice/summary: element %d (half-width): expected 1 to %d, "
+                                "found %d",
+                                b->name, PLIANT_LATTICE_HALF_WIDTH, PLIANT_LATTICE_WIDTH_LIMIT,
+                                (int)w);
+    b->view->lattice_half_width = w;
+    b->extent[PLIANT_EXTENT_REGION_ROW] = 2 * (uint64_t)w + 2;
+    b->extent[PLIANT_EXTENT_PLATE_ROW] = 2 * (uint64_t)w + 4;
     return PLIANT_OK;
 }
 
@@ -180,7 +218,7 @@ static pliant_status check_parents(const binding *b, pliant_error *err)
 }
 
 // Free and fixed nodes are ascending; together every vertex is there once.
-static pliant_status check_domains(const binding *b, pliant_error *err)
+static pliant_status check_membership(const binding *b, pliant_error *err)
 {
     const pliant_model_view *v = b->view;
     int32_t i = 0, j = 0;
@@ -218,14 +256,33 @@ static pliant_status check_level_offsets(const binding *b, const pliant_section 
     return PLIANT_OK;
 }
 
+static pliant_status check_domains(const binding *b, pliant_error *err)
+{
+    const pliant_model_view *v = b->view;
+    const int64_t n = v->vertex_count;
+    if (!v->has_greens) return PLIANT_OK;
+    pliant_status status =
+        pliant_bind_indices(b->reader, b->section.free_nodes, 0, n, PLIANT_ASCENDING, err);
+    if (status == PLIANT_OK)
+        status =
+            pliant_bind_indices(b->reader, b->section.fixed_nodes, 0, n, PLIANT_ASCENDING, err);
+    if (status == PLIANT_OK) status = check_membership(b, err);
+    if (status == PLIANT_OK)
+        status =
+            check_level_offsets(b, b->section.free_level_offset, v->free_nodes, v->free_count, err);
+    if (status == PLIANT_OK)
+        status = check_level_offsets(b, b->section.fixed_level_offset, v->fixed_nodes,
+                                     v->fixed_count, err);
+    return status;
+}
+
 // The model's vertices come first, and from the same vertices of the input.
 static pliant_status check_detail_source(const binding *b, pliant_error *err)
 {
     const pliant_model_view *v = b->view;
     if (!b->is_there[PLIANT_WITH_DETAIL]) return PLIANT_OK;
-    const pliant_status status =
-        pliant_bind_indices(b->reader, b->section.detail_source_index, -1, (int64_t)INT32_MAX + 1,
-                            PLIANT_ANY_ORDER, err);
+    const pliant_status status = pliant_bind_indices(b->reader, b->section.detail_source_index, -1,
+                                                     (int64_t)INT32_MAX + 1, PLIANT_ANY_ORDER, err);
     if (status < 0) return status;
     for (int32_t i = 0; i < v->vertex_count; i++)
         if (v->detail_source_index[i] != v->source_index[i])
@@ -255,8 +312,7 @@ static pliant_status check_text(const binding *b, pliant_error *err)
 
 static pliant_status check_contents(const binding *b, pliant_error *err)
 {
-    const pliant_model_view *v = b->view;
-    const int64_t n = v->vertex_count;
+    const int64_t n = b->view->vertex_count;
     const pliant_section *finite[] = {b->section.vertices, b->section.material,
                                       b->section.gravity_free, b->section.gravity_fixed,
                                       b->section.detail_offset};
@@ -268,20 +324,9 @@ static pliant_status check_contents(const binding *b, pliant_error *err)
     if (status == PLIANT_OK)
         status = pliant_bind_indices(b->reader, b->section.source_index, -1, (int64_t)INT32_MAX + 1,
                                      PLIANT_ANY_ORDER, err);
-    if (status == PLIANT_OK)
-        status = pliant_bind_indices(b->reader, b->section.free_nodes, 0, n, PLIANT_ASCENDING, err);
-    if (status == PLIANT_OK)
-        status =
-            pliant_bind_indices(b->reader, b->section.fixed_nodes, 0, n, PLIANT_ASCENDING, err);
     if (status == PLIANT_OK) status = check_material(b, err);
     if (status == PLIANT_OK) status = check_parents(b, err);
     if (status == PLIANT_OK) status = check_domains(b, err);
-    if (status == PLIANT_OK)
-        status =
-            check_level_offsets(b, b->section.free_level_offset, v->free_nodes, v->free_count, err);
-    if (status == PLIANT_OK)
-        status = check_level_offsets(b, b->section.fixed_level_offset, v->fixed_nodes,
-                                     v->fixed_count, err);
     if (status == PLIANT_OK) status = check_detail_source(b, err);
     if (status == PLIANT_OK) status = check_text(b, err);
     return status;
@@ -316,6 +361,7 @@ static int has_presence(const char *path, pliant_presence wanted)
         const int length = snprintf(group, sizeof group, "/greens/%s/", pliant_block_text(block));
         found |= strncmp(path, group, (size_t)length) == 0;
     }
+    found |= wanted == PLIANT_WITH_GREENS && strncmp(path, "/greens/", strlen("/greens/")) == 0;
     return found;
 }
 
@@ -416,6 +462,7 @@ static pliant_status bind_greens(binding *b, pliant_error *err)
 {
     const pliant_model_view *v = b->view;
     int stored = 0;
+    if (!v->has_greens) return PLIANT_OK;
     for (int32_t level = 0; level < v->level_count; level++) {
         int any = 0;
         for (pliant_block_name block = 0; block < PLIANT_BLOCK_COUNT; block++)
@@ -445,18 +492,28 @@ pliant_status pliant_model_view_bind(const pliant_reader *reader, pliant_model_v
     pliant_model_view v;
     memset(&v, 0, sizeof v);
     v.has_supports = has_any(reader, PLIANT_WITH_SUPPORTS);
+    v.has_greens = v.has_supports || has_any(reader, PLIANT_WITH_GREENS);
     binding b = {.reader = reader,
                  .name = name,
                  .view = &v,
                  .is_there = {[PLIANT_ALWAYS] = 1,
                               [PLIANT_WITH_SUPPORTS] = v.has_supports,
-                              [PLIANT_WITH_DETAIL] = has_any(reader, PLIANT_WITH_DETAIL)}};
+                              [PLIANT_WITH_DETAIL] = has_any(reader, PLIANT_WITH_DETAIL),
+                              [PLIANT_WITH_GREENS] = v.has_greens,
+                              [PLIANT_WITH_LATTICE] = has_any(reader, PLIANT_WITH_LATTICE)}};
+    if (!v.has_greens && !b.is_there[PLIANT_WITH_LATTICE])
+        return pliant_error_set(err, PLIANT_ERR_MISSING,
+                                "%s: expected Green's functions or a lattice, found a mesh only",
+                                name);
     pliant_status status = find_sections(&b, err);
     if (status == PLIANT_OK) status = count_all(&b, err);
+    if (status == PLIANT_OK) status = count_lattice(&b, err);
     if (status == PLIANT_OK) status = check_level_counts(&b, err);
     if (status == PLIANT_OK) status = check_detail_counts(&b, err);
     if (status == PLIANT_OK) status = check_shapes(&b, err);
     if (status == PLIANT_OK) status = check_contents(&b, err);
+    if (status == PLIANT_OK && b.is_there[PLIANT_WITH_LATTICE])
+        status = pliant_lattice_check(name, &v, v.lattice_dims, err);
     if (status == PLIANT_OK) status = bind_greens(&b, err);
     if (status == PLIANT_OK) *view = v;
     return status;

@@ -121,6 +121,56 @@ static void append_level(list *l, const pliant_model_layout *layout, pliant_bloc
 #undef APPEND
 }
 
+static pliant_status check_greens(const pliant_model_layout *layout, pliant_error *err)
+{
+    const int32_t n = layout->vertex_count, m = layout->free_count, k = layout->fixed_count;
+    if (!layout->has_greens) return PLIANT_OK;
+    if (m < 0 || k < 0 || m > n || k != n - m)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "model layout: expected %d free and fixed nodes, found %d and %d",
+                                (int)n, (int)m, (int)k);
+    if (layout->level_mask == 0 || layout->level_mask >> layout->level_count != 0)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "model layout: expected stored levels among 0..%d, found mask %#x",
+                                (int)layout->level_count - 1, (unsigned)layout->level_mask);
+    return PLIANT_OK;
+}
+
+static pliant_status check_lattice(const pliant_lattice_layout *l, pliant_error *err)
+{
+    if (l->cell_count == 0) return PLIANT_OK;
+    const struct {
+        const char *name;
+        int32_t found, least, most;
+    } counts[] = {
+        {"cells", l->cell_count, 1, PLIANT_LATTICE_LIMIT},
+        {"particles", l->particle_count, 8, PLIANT_LATTICE_LIMIT},
+        {"half-width", l->half_width, 1, PLIANT_LATTICE_WIDTH_LIMIT},
+        {"region nodes", l->region_node_count, 0, l->particle_count},
+        {"plate nodes", l->plate_node_count, 0, PLIANT_VERTEX_LIMIT},
+        {"batches", l->batch_count, 1, PLIANT_FACE_LIMIT},
+        {"batch points", l->batch_point_count, 8, INT32_MAX},
+    };
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        if (counts[i].found < counts[i].least || counts[i].found > counts[i].most)
+            return pliant_error_set(
+                err, PLIANT_ERR_ARGUMENT, "model layout: lattice: %s: expected %d to %d, found %d",
+                counts[i].name, (int)counts[i].least, (int)counts[i].most, (int)counts[i].found);
+    return PLIANT_OK;
+}
+
+static void set_lattice(uint64_t *extent, const pliant_lattice_layout *l)
+{
+    extent[PLIANT_EXTENT_CELLS] = (uint64_t)l->cell_count;
+    extent[PLIANT_EXTENT_PARTICLES] = (uint64_t)l->particle_count;
+    extent[PLIANT_EXTENT_REGION_NODES] = (uint64_t)l->region_node_count;
+    extent[PLIANT_EXTENT_PLATE_NODES] = (uint64_t)l->plate_node_count;
+    extent[PLIANT_EXTENT_REGION_ROW] = 2 * (uint64_t)l->half_width + 2;
+    extent[PLIANT_EXTENT_PLATE_ROW] = 2 * (uint64_t)l->half_width + 4;
+    extent[PLIANT_EXTENT_BATCHES_1] = (uint64_t)l->batch_count + 1;
+    extent[PLIANT_EXTENT_BATCH_POINTS] = (uint64_t)l->batch_point_count;
+}
+
 pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
                                            pliant_section_def *sections, int32_t *section_count,
                                            pliant_error *err)
@@ -130,13 +180,18 @@ pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
                                 PLIANT_LEVEL_LIMIT + 1, (int)layout->level_count);
     const int32_t n = layout->vertex_count, m = layout->free_count, k = layout->fixed_count;
     if (n < 1 || n > PLIANT_VERTEX_LIMIT || layout->face_count < 1 ||
-        layout->face_count > PLIANT_FACE_LIMIT || layout->base_count < 1 ||
-        layout->base_count > n || m < 0 || k < 0 || m > n || k != n - m)
+        layout->face_count > PLIANT_FACE_LIMIT || layout->base_count < 1 || layout->base_count > n)
+        return pliant_error_set(
+            err, PLIANT_ERR_ARGUMENT,
+            "model layout: counts disagree: %d vertices, %d faces, %d base vertices", (int)n,
+            (int)layout->face_count, (int)layout->base_count);
+    pliant_status status = check_greens(layout, err);
+    if (status == PLIANT_OK) status = check_lattice(&layout->lattice, err);
+    if (status < 0) return status;
+    if (!layout->has_greens && layout->lattice.cell_count == 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "model layout: counts disagree: %d vertices, %d faces, %d base "
-                                "vertices, %d free, %d fixed",
-                                (int)n, (int)layout->face_count, (int)layout->base_count, (int)m,
-                                (int)k);
+                                "model layout: expected Green's functions or a lattice, found "
+                                "neither");
     if (layout->detail_steps != 0 &&
         (layout->detail_steps < 0 ||
          layout->detail_steps > PLIANT_LEVEL_LIMIT + 1 - layout->level_count ||
@@ -147,10 +202,6 @@ pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
                                 PLIANT_LEVEL_LIMIT + 1 - (int)layout->level_count, (int)n + 1,
                                 PLIANT_VERTEX_LIMIT, (int)layout->detail_steps,
                                 (int)layout->detail_vertex_count);
-    if (layout->level_mask == 0 || layout->level_mask >> layout->level_count != 0)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "model layout: expected stored levels among 0..%d, found mask %#x",
-                                (int)layout->level_count - 1, (unsigned)layout->level_mask);
 
     list l = {.sections = sections};
     set_constants(l.extent);
@@ -164,18 +215,24 @@ pliant_status pliant_model_layout_sections(const pliant_model_layout *layout,
     l.extent[PLIANT_EXTENT_TEXT] = layout->text_bytes;
     l.extent[PLIANT_EXTENT_DETAIL] = (uint64_t)layout->detail_vertex_count;
     l.extent[PLIANT_EXTENT_STEPS_1] = (uint64_t)layout->detail_steps + 1;
+    set_lattice(l.extent, &layout->lattice);
 
-    const int is_there[] = {[PLIANT_ALWAYS] = 1,
-                            [PLIANT_WITH_SUPPORTS] = layout->has_supports,
-                            [PLIANT_WITH_DETAIL] = layout->detail_steps > 0};
+    const int has_supports = layout->has_greens && layout->has_supports;
+    const int is_there[PLIANT_PRESENCE_COUNT] = {
+        [PLIANT_ALWAYS] = 1,
+        [PLIANT_WITH_SUPPORTS] = has_supports,
+        [PLIANT_WITH_DETAIL] = layout->detail_steps > 0,
+        [PLIANT_WITH_GREENS] = layout->has_greens,
+        [PLIANT_WITH_LATTICE] = layout->lattice.cell_count > 0,
+    };
 #define APPEND(field, path, type, rank, a, b, c, presence, unit)                                   \
     if (is_there[PLIANT_##presence])                                                               \
         append(&l, path, PLIANT_##type, rank, PLIANT_EXTENT_##a, PLIANT_EXTENT_##b,                \
                PLIANT_EXTENT_##c);
     PLIANT_MODEL_SECTIONS(APPEND)
 #undef APPEND
-    const pliant_block_name last = layout->has_supports ? PLIANT_FIXED_FIXED : PLIANT_FREE_FREE;
-    for (pliant_block_name block = PLIANT_FREE_FREE; block <= last; block++)
+    const pliant_block_name last = has_supports ? PLIANT_FIXED_FIXED : PLIANT_FREE_FREE;
+    for (pliant_block_name block = PLIANT_FREE_FREE; layout->has_greens && block <= last; block++)
         for (int32_t level = 0; level < layout->level_count; level++)
             if (layout->level_mask >> level & 1) append_level(&l, layout, block, level);
     return finish(&l, section_count, err);

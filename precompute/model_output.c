@@ -182,6 +182,7 @@ static pliant_status create(const char *path, const pliant_greens *g, const plia
                                   .face_count = p->multires->mesh->face_count,
                                   .level_count = finest + 1,
                                   .base_count = p->multires->vertex_count[0],
+                                  .has_greens = 1,
                                   .free_count = p->free_count,
                                   .fixed_count = p->fixed_count,
                                   .text_bytes = strlen(provenance),

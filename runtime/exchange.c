@@ -51,6 +51,8 @@ pliant_status pliant_exchange_create(const pliant_model *model, const pliant_sol
     if (!model || !result)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "pliant_exchange_create: expected a model and a place, found NULL");
+    pliant_status status = pliant_model_check_greens(model, err);
+    if (status < 0) return status;
     const pliant_solver_def used = def ? *def : pliant_solver_default(model);
     if (used.constraint_capacity < 1 || used.load_capacity < 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
@@ -65,7 +67,7 @@ pliant_status pliant_exchange_create(const pliant_model *model, const pliant_sol
     exchange->constraint_capacity = used.constraint_capacity < n ? used.constraint_capacity : n;
     exchange->load_capacity = used.load_capacity < n ? used.load_capacity : n;
     lay_out(&exchange->arena, exchange);
-    const pliant_status status = pliant_arena_reserve(&exchange->arena, err);
+    status = pliant_arena_reserve(&exchange->arena, err);
     if (status < 0) {
         free(exchange);
         return status;

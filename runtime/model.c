@@ -46,6 +46,7 @@ static pliant_status bind_greens(pliant_model *model, pliant_error *err)
 {
     const pliant_model_view *view = &model->view;
     const int32_t blocks = view->has_supports ? PLIANT_BLOCK_COUNT : 1;
+    if (!view->has_greens) return PLIANT_OK;
     for (int32_t l = 0; l < view->level_count; l++) {
         if (!view->greens[PLIANT_FREE_FREE][l].column_offset) continue;
         if (model->stored_levels == 0) model->coarsest_stored = l;
@@ -118,6 +119,7 @@ static pliant_status plan_domains(pliant_model *model, pliant_error *err)
 {
     const pliant_model_view *view = &model->view;
     const int32_t l = model->finest_stored;
+    if (!view->has_greens) return PLIANT_OK;
     model->domains[PLIANT_DOMAIN_FREE] = (pliant_model_domain){
         .count = view->free_count, .nodes = view->free_nodes, .gravity = view->gravity_free};
     model->domains[PLIANT_DOMAIN_FIXED] = (pliant_model_domain){
@@ -209,10 +211,21 @@ pliant_status pliant_model_verify(const pliant_model *model, pliant_error *err)
     return pliant_reader_verify(model->reader, err);
 }
 
+pliant_status pliant_model_check_greens(const pliant_model *model, pliant_error *err)
+{
+    if (model->view.has_greens) return PLIANT_OK;
+    return pliant_error_set(err, PLIANT_ERR_MISSING,
+                            "%s: expected Green's functions, found a lattice only (made with "
+                            "--no-greens)",
+                            pliant_reader_name(model->reader));
+}
+
 pliant_model_info pliant_model_describe(const pliant_model *model)
 {
+    static const double none[PLIANT_SUMMARY_COUNT] = {0};
     const pliant_model_view *view = &model->view;
-    const double *summary = view->greens[PLIANT_FREE_FREE][model->finest_stored].summary;
+    const double *stored = view->greens[PLIANT_FREE_FREE][model->finest_stored].summary;
+    const double *summary = stored ? stored : none;
     return (pliant_model_info){
         .vertex_count = view->vertex_count,
         .face_count = view->face_count,
@@ -320,7 +333,7 @@ int32_t pliant_model_from_source(const pliant_model *model, int32_t source)
 int32_t pliant_model_is_free(const pliant_model *model, int32_t vertex)
 {
     if (vertex < 0 || vertex >= model->vertex_count) return -1;
-    return model->domain[vertex] == PLIANT_DOMAIN_FREE;
+    return model->view.has_greens && model->domain[vertex] == PLIANT_DOMAIN_FREE;
 }
 
 double pliant_model_area(const pliant_model *model, int32_t vertex)
@@ -330,7 +343,7 @@ double pliant_model_area(const pliant_model *model, int32_t vertex)
 
 int32_t pliant_model_nearest_on(const pliant_model *model, int32_t level, const double *position)
 {
-    if (level < 0 || level > model->finest_level) return -1;
+    if (level < 0 || level > model->finest_level || !model->view.has_greens) return -1;
     const pliant_model_domain *domain = &model->domains[PLIANT_DOMAIN_FREE];
     const int32_t count = domain->wavelet->level_offset[level + 1];
     int32_t nearest = -1;

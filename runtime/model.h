@@ -14,7 +14,7 @@ enum { PLIANT_DOMAIN_FREE, PLIANT_DOMAIN_FIXED, PLIANT_DOMAIN_COUNT };
 typedef struct pliant_model_domain {
     int32_t count;
     const int32_t *nodes;     // shape [count], ascending vertices; borrowed from the file
-    pliant_wavelet *wavelet;  // owned
+    pliant_wavelet *wavelet;  // owned; NULL without Green's functions
     const float *gravity;     // shape [count][3][3], transformed; NULL: not stored
 } pliant_model_domain;
 
@@ -46,6 +46,10 @@ static inline const pliant_columns *pliant_model_columns(const pliant_model *mod
 {
     return &model->greens[row_domain][model->domain[node.vertex]][node.level];
 }
+
+// PLIANT_ERR_MISSING, by name: the file has a lattice only. Then no vertex is of either domain.
+PLIANT_UNUSED_RESULT pliant_status pliant_model_check_greens(const pliant_model *model,
+                                                             pliant_error *err);
 
 // Is it a node with columns? PLIANT_ERR_ARGUMENT: no such node; PLIANT_ERR_MISSING: not stored.
 pliant_status pliant_model_check_node(const pliant_model *model, pliant_node node);

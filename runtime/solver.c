@@ -100,6 +100,8 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
     if (!model || !result)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "pliant_solver_create: expected a model and a place, found NULL");
+    pliant_status status = pliant_model_check_greens(model, err);
+    if (status < 0) return status;
     const pliant_solver_def used = def ? *def : pliant_solver_default(model);
     const struct {
         const char *name;
@@ -132,7 +134,7 @@ pliant_status pliant_solver_create(const pliant_model *model, const pliant_solve
         n / query_at_once_part > query_at_once_floor ? n / query_at_once_part : query_at_once_floor;
 
     lay_out(&solver->arena, solver);
-    pliant_status status = pliant_arena_reserve(&solver->arena, err);
+    status = pliant_arena_reserve(&solver->arena, err);
     if (status < 0) {
         pliant_solver_destroy(solver);
         return status;

@@ -103,7 +103,8 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
             (int)facts.source_count, (int)(v->vertex_count - facts.source_count));
     fprintf(stream, "material    Young's modulus %g, Poisson's ratio %g, density %g\n",
             v->material[0], v->material[1], v->material[2]);
-    fprintf(stream, "domains     %d free, %d fixed\n", (int)v->free_count, (int)v->fixed_count);
+    if (v->has_greens)
+        fprintf(stream, "domains     %d free, %d fixed\n", (int)v->free_count, (int)v->fixed_count);
 }
 
 static void print_detail(const pliant_model_view *v, FILE *stream)
@@ -139,6 +140,7 @@ static void print_level(const pliant_model_view *v, pliant_block_name block, int
 
 static void print_greens(const pliant_model_view *v, FILE *stream)
 {
+    if (!v->has_greens) return;
     fprintf(stream, "%-12s%-11s  %5s  %8s  %7s  %9s  %7s  %7s  %7s  %7s  %7s  %8s  %s\n", "greens",
             "block", "level", "vertices", "columns", "stored", "size", "factor", "eps", "rms", "max",
             "smallest", "wavelet");

@@ -62,8 +62,10 @@ static void print_mesh(const pliant_model_view *v, FILE *stream)
     print_number(v->material[1], stream);
     fputs(", \"density\": ", stream);
     print_number(v->material[2], stream);
-    fprintf(stream, "},\n  \"domains\": {\"free\": %d, \"fixed\": %d}", (int)v->free_count,
-            (int)v->fixed_count);
+    fputs("}", stream);
+    if (v->has_greens)
+        fprintf(stream, ",\n  \"domains\": {\"free\": %d, \"fixed\": %d}", (int)v->free_count,
+                (int)v->fixed_count);
 }
 
 static void print_detail(const pliant_model_view *v, FILE *stream)
@@ -132,6 +134,7 @@ static void print_level(const pliant_model_view *v, pliant_block_name block, int
 static void print_greens(const pliant_model_view *v, const pliant_definiteness *verified, FILE *stream)
 {
     const char *separator = "\n    ";
+    if (!v->has_greens) return;
     fputs(",\n  \"blocks\": [", stream);
     for (pliant_block_name block = PLIANT_FREE_FREE; block < PLIANT_BLOCK_COUNT; block++)
         for (int32_t level = 0; level < v->level_count; level++) {

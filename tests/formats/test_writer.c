@@ -442,7 +442,7 @@ static void layout_counts_are_checked(void **state)
     pliant_section_def sections[PLIANT_SECTION_LIMIT];
     int32_t count = -7;
     pliant_model_layout layout = {.vertex_count = 6, .face_count = 8, .level_count = 1, .base_count = 6,
-                                  .free_count = 5, .fixed_count = 1, .level_mask = 1};
+                                  .has_greens = 1, .free_count = 5, .fixed_count = 1, .level_mask = 1};
     check_ok(pliant_model_layout_sections(&layout, sections, &count, &err), &err);
     assert_int_equal(count, 16);
     pliant_model_layout bad = layout;

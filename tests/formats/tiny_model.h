@@ -4,6 +4,7 @@
 // numbers of the blocks mean nothing, the indices are all in order.
 #pragma once
 
+#include "pliant/regions.h"
 #include "pliant/sections.h"
 
 #include <math.h>
@@ -149,12 +150,102 @@ static inline int32_t tiny_domain(const tiny_mesh *mesh, int fixed, int32_t *nod
 enum {
     TINY_SUPPORTS = 1,  // as --blocks all
     TINY_DETAIL = 2,    // a displaced subdivision surface, one step finer
+    TINY_LATTICE = 4,   // a lattice, some of whose regions are irregular
+    TINY_NO_GREENS = 8, // no domains, blocks and gravity: with TINY_LATTICE alone
 };
+
+// ---- A lattice: 2 x 2 x 2 unit cells about the octahedron, and one cell beside them ----
+
+#define TINY_CELLS 9
+
+typedef struct tiny_lattice {
+    int32_t cells[TINY_CELLS][3], particles[8 * TINY_CELLS][3];
+    int32_t particle_count;
+    pliant_regions *regions;  // w = 1: the lone cell's particles are in windows, but not in regions
+} tiny_lattice;
+
+static inline void tiny_lattice_make(tiny_lattice *t)
+{
+    int32_t cell = 0;
+    for (int32_t i = 0; i < 8; i++) {
+        if (i == 2) memcpy(t->cells[cell++], (int32_t[3]){3, 0, 0}, sizeof t->cells[0]);
+        memcpy(t->cells[cell++], (int32_t[3]){i & 1, i >> 1 & 1, i >> 2}, sizeof t->cells[0]);
+    }
+    t->particle_count = pliant_lattice_particles(TINY_CELLS, t->cells[0], t->particles[0]);
+    const pliant_lattice_shape shape = {{5, 3, 3}, t->particle_count, TINY_CELLS, t->particles[0], t->cells[0]};
+    pliant_error err;
+    if (pliant_regions_create(&shape, 1, &t->regions, &err) < 0) abort();
+}
+
+static inline pliant_lattice_layout tiny_lattice_layout(const tiny_lattice *t, int32_t face_count)
+{
+    return (pliant_lattice_layout){.cell_count = TINY_CELLS,
+                                   .particle_count = t->particle_count,
+                                   .half_width = 1,
+                                   .region_node_count = t->regions->region_node_count,
+                                   .plate_node_count = t->regions->plate_node_count,
+                                   .batch_count = face_count < 4 ? 1 : 2,
+                                   .batch_point_count = (face_count < 4 ? 1 : 2) * 27};
+}
+
+static inline void tiny_copy(tiny_file *file, const char *path, const void *data)
+{
+    tiny_section *s = tiny_find(file, path);
+    if (s->bytes > 0) memcpy(s->data, data, s->bytes);
+}
+
+static inline void tiny_lattice_fill(const tiny_lattice *t, const tiny_mesh *mesh, tiny_file *file)
+{
+    const pliant_regions *r = t->regions;
+    const double frame[8] = {-1, -1, -1, 1, 8};
+    const int32_t summary[8] = {1, 0, 2, r->region_count};
+    tiny_copy(file, "/lattice/frame", frame);
+    tiny_copy(file, "/lattice/summary", summary);
+    tiny_copy(file, "/lattice/cells", t->cells);
+    tiny_copy(file, "/lattice/particles", t->particles);
+    float *mass = tiny_find(file, "/lattice/mass")->data;
+    for (int32_t p = 0; p < t->particle_count; p++) mass[p] = 8.f / (float)t->particle_count;
+    tiny_copy(file, "/lattice/region_size", r->size);
+    tiny_copy(file, "/lattice/region_share", r->share);
+    tiny_copy(file, "/lattice/region_nodes", r->region_nodes);
+    tiny_copy(file, "/lattice/plate_nodes", r->plate_nodes);
+    int32_t *cell = tiny_find(file, "/lattice/vertex_cell")->data;
+    float *offset = tiny_find(file, "/lattice/vertex_offset")->data;
+    float *tangents = tiny_find(file, "/lattice/vertex_tangents")->data;
+    for (int32_t v = 0; v < mesh->vertex_count; v++) {
+        const double *x = mesh->vertices[v];
+        const int32_t corner = (x[0] > 0) + 2 * (x[1] > 0) + 4 * (x[2] > 0);
+        cell[v] = corner < 2 ? corner : corner + 1;
+        for (int d = 0; d < 3; d++) offset[3 * v + d] = (float)(x[d] > 0 ? x[d] : x[d] + 1);
+        // Two directions across the one to the vertex.
+        const double flat = hypot(x[0], x[1]), length = hypot(flat, x[2]);
+        const double u[3] = {flat > 0 ? -x[1] / flat : 1, flat > 0 ? x[0] / flat : 0, 0};
+        for (int d = 0; d < 3; d++) {
+            const int e = (d + 1) % 3, f = (d + 2) % 3;
+            tangents[6 * v + d] = (float)u[d];
+            tangents[6 * v + 3 + d] = (float)((x[e] * u[f] - x[f] * u[e]) / length);
+        }
+    }
+    // Half of the faces a batch, the last ones first; every batch has the block's particles.
+    const int32_t batches = mesh->face_count < 4 ? 1 : 2;
+    int32_t *face_offset = tiny_find(file, "/lattice/batch_face_offset")->data;
+    int32_t *point_offset = tiny_find(file, "/lattice/batch_point_offset")->data;
+    int32_t *points = tiny_find(file, "/lattice/batch_points")->data;
+    for (int32_t f = 0; f < mesh->face_count; f++)
+        ((int32_t *)tiny_find(file, "/lattice/batch_faces")->data)[f] = mesh->face_count - 1 - f;
+    for (int32_t b = 0; b < batches; b++) {
+        face_offset[b + 1] = mesh->face_count * (b + 1) / batches;
+        point_offset[b + 1] = point_offset[b];
+        for (int32_t p = 0; p < t->particle_count; p++)
+            if (t->particles[p][0] < 3) points[point_offset[b + 1]++] = p;
+    }
+}
 
 // The sections of a model. Free it with tiny_free.
 static inline void tiny_model_make(int32_t level_count, int parts, tiny_file *file)
 {
     const int supports = parts & TINY_SUPPORTS, detail = (parts & TINY_DETAIL) != 0;
+    const int has_greens = !(parts & TINY_NO_GREENS);
     const tiny_mesh mesh = tiny_mesh_make(level_count);
     int32_t nodes[2][TINY_VERTICES], offset[2][TINY_LEVELS + 1], count[2];
     for (int fixed = 0; fixed < 2; fixed++) count[fixed] = tiny_domain(&mesh, fixed, nodes[fixed], offset[fixed]);
@@ -164,12 +255,18 @@ static inline void tiny_model_make(int32_t level_count, int parts, tiny_file *fi
         .face_count = mesh.face_count,
         .level_count = mesh.level_count,
         .base_count = mesh.level_vertex_count[0],
+        .has_greens = has_greens,
         .free_count = count[0],
         .fixed_count = count[1],
         .text_bytes = sizeof tiny_provenance - 1 + 5,
         .has_supports = supports,
         .level_mask = 1u << finest,
     };
+    tiny_lattice lattice = {.regions = NULL};
+    if (parts & TINY_LATTICE) {
+        tiny_lattice_make(&lattice);
+        layout.lattice = tiny_lattice_layout(&lattice, mesh.face_count);
+    }
     const int32_t detail_levels[2] = {mesh.vertex_count, mesh.vertex_count + mesh.face_count / 2 * 3};
     if (detail) {
         layout.detail_steps = 1;
@@ -195,21 +292,24 @@ static inline void tiny_model_make(int32_t level_count, int parts, tiny_file *fi
         ((int32_t *)tiny_find(file, "/mesh/source_index")->data)[v] = v < 6 ? 5 - v : -1;
     const double material[3] = {1000, 0.3, 1};
     memcpy(tiny_find(file, "/material")->data, material, sizeof material);
-    memcpy(tiny_find(file, "/domains/free/nodes")->data, nodes[0], sizeof(int32_t) * (size_t)count[0]);
-    memcpy(tiny_find(file, "/domains/fixed/nodes")->data, nodes[1], sizeof(int32_t) * (size_t)count[1]);
-    memcpy(tiny_find(file, "/domains/free/level_offset")->data, offset[0], sizeof(int32_t) * (size_t)(level_count + 1));
-    memcpy(tiny_find(file, "/domains/fixed/level_offset")->data, offset[1], sizeof(int32_t) * (size_t)(level_count + 1));
-    tiny_fill_floats(tiny_find(file, "/body/gravity/free"), 1);
-    if (supports) tiny_fill_floats(tiny_find(file, "/body/gravity/fixed"), 2);
+    tiny_section *text = tiny_find(file, "/provenance/text");
+    memset(text->data, '\n', text->bytes);
+    memcpy(text->data, tiny_provenance, sizeof tiny_provenance - 1);
     if (detail) {
         memcpy(tiny_find(file, "/detail/level_count")->data, detail_levels, sizeof detail_levels);
         tiny_fill_floats(tiny_find(file, "/detail/offset"), 3);
         for (int32_t v = 0; v < detail_levels[1]; v++)
             ((int32_t *)tiny_find(file, "/detail/source_index")->data)[v] = v < 6 ? 5 - v : -1;
     }
-    tiny_section *text = tiny_find(file, "/provenance/text");
-    memset(text->data, '\n', text->bytes);
-    memcpy(text->data, tiny_provenance, sizeof tiny_provenance - 1);
+    if (parts & TINY_LATTICE) tiny_lattice_fill(&lattice, &mesh, file);
+    pliant_regions_destroy(lattice.regions);
+    if (!has_greens) return;
+    memcpy(tiny_find(file, "/domains/free/nodes")->data, nodes[0], sizeof(int32_t) * (size_t)count[0]);
+    memcpy(tiny_find(file, "/domains/fixed/nodes")->data, nodes[1], sizeof(int32_t) * (size_t)count[1]);
+    memcpy(tiny_find(file, "/domains/free/level_offset")->data, offset[0], sizeof(int32_t) * (size_t)(level_count + 1));
+    memcpy(tiny_find(file, "/domains/fixed/level_offset")->data, offset[1], sizeof(int32_t) * (size_t)(level_count + 1));
+    tiny_fill_floats(tiny_find(file, "/body/gravity/free"), 1);
+    if (supports) tiny_fill_floats(tiny_find(file, "/body/gravity/fixed"), 2);
 
     for (int block = 0; block < (supports ? PLIANT_BLOCK_COUNT : 1); block++) {
         char path[PLIANT_PATH_LIMIT];

@@ -507,6 +507,7 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
         .face_count = surface->mesh->face_count,
         .level_count = surface->level_count,
         .base_count = surface->vertex_count[0],
+        .has_greens = 1,
         .free_count = s->counts[0],
         .fixed_count = s->counts[1],
         .text_bytes = sizeof provenance - 1,

@@ -19,7 +19,9 @@ typedef struct pliant_solver pliant_solver;  // one boundary value problem on a 
 // ---- Model ----
 
 // Map a file and check its header, section bounds and indices (not the payload's checksums: see
-// verify). `err` may be NULL.
+// verify). `err` may be NULL. A file may hold a lattice without Green's functions (--no-greens): no
+// vertex of it is free or fixed, what tells of them is 0, none is nearest, and creating a solver or
+// an exchange on it is PLIANT_ERR_MISSING.
 PLIANT_CALL pliant_status pliant_model_open(const char *path, pliant_model **model,
                                             pliant_error *err);
 PLIANT_API void pliant_model_close(pliant_model *model);  // after its solvers; NULL is fine
@@ -62,7 +64,7 @@ PLIANT_API int32_t pliant_model_from_source(const pliant_model *model, int32_t s
 PLIANT_API int32_t pliant_model_is_free(const pliant_model *model,
                                         int32_t vertex);  // 1, 0; -1 out of range
 PLIANT_API double pliant_model_area(const pliant_model *model, int32_t vertex);  // a_i, m^2 (GF-4)
-// Free vertex whose rest position is nearest to `position` (shape [3], m).
+// Free vertex whose rest position is nearest to `position` (shape [3], m); -1: there is none.
 PLIANT_API int32_t pliant_model_nearest(const pliant_model *model, const double *position);
 // The same among the vertices of a level; -1: there is none.
 PLIANT_API int32_t pliant_model_nearest_on(const pliant_model *model, int32_t level,
