@@ -1,6 +1,8 @@
 // synthetic_model.c: models with exactly known answers, for tests that need a model file.
 #include "synthetic_model.h"
 
+#include "synthetic_lattice.h"
+
 #include "pliant/loop.h"
 #include "pliant/writer.h"
 
@@ -516,6 +518,7 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
         .detail_steps = s->detail_steps,
         .detail_vertex_count = s->detail_steps ? s->shape.mesh->vertex_count : 0,
     };
+    if (s->lattice) layout.lattice = s->lattice->layout;
     for (int32_t l = 0; l < surface->level_count; l++) {
         layout.free_columns[l] = s->wavelets[0]->level_offset[l + 1];
         layout.fixed_columns[l] = s->wavelets[1]->level_offset[l + 1];
@@ -553,6 +556,7 @@ void check_synthetic_write(const check_synthetic *s, const char *path)
         for (int32_t l = 0; l <= s->def.levels; l++)
             if (is_stored(s, l)) write_level(s, writer, block, l);
     if (s->detail_steps) write_detail(s, writer);
+    if (s->lattice) check_lattice_write_sections(s->lattice, writer);
     check_ok(pliant_writer_write_provenance(writer, provenance, &err), &err);
     check_ok(pliant_writer_commit(writer, &err), &err);
 }

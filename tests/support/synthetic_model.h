@@ -66,6 +66,8 @@ typedef struct check_synthetic {
     double *coarse_xi[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
     check_compressed coarse[PLIANT_LEVEL_LIMIT + 1][PLIANT_BLOCK_COUNT];
     float *gravity_coefficients[2];  // shape [m][3][3], [k][3][3]
+    // A lattice of the finest mesh to write, too; borrowed. NULL: none.
+    const struct check_lattice *lattice;
     // After check_synthetic_roughen: steps to the finer shape, and that; else 0, mesh NULL.
     int32_t detail_steps;
     check_surface shape;
