@@ -165,6 +165,144 @@ void pliant_body_destroy(pliant_body *body)
     free(body);
 }
 
+// ---- State ----
+
+void pliant_body_positions(const pliant_body *body, pliant_vec3 *x)
+{
+    for (int32_t p = 0; p < body->lattice->particle_count; p++)
+        x[p] = pliant_body_get(body->x, body->lattice->slot[p]);
+}
+
+void pliant_body_velocities(const pliant_body *body, pliant_vec3 *v)
+{
+    for (int32_t p = 0; p < body->lattice->particle_count; p++)
+        v[p] = pliant_body_get(body->v, body->lattice->slot[p]);
+}
+
+static int is_finite(pliant_vec3 a)
+{
+    return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
+}
+
+static pliant_status set_all(const pliant_body *body, const pliant_vec3 *values, float *array)
+{
+    for (int32_t p = 0; p < body->lattice->particle_count; p++)
+        if (!is_finite(values[p])) return PLIANT_ERR_ARGUMENT;
+    for (int32_t p = 0; p < body->lattice->particle_count; p++)
+        pliant_body_set(array, body->lattice->slot[p], values[p]);
+    return PLIANT_OK;
+}
+
+pliant_status pliant_body_set_positions(pliant_body *body, const pliant_vec3 *x)
+{
+    return set_all(body, x, body->x);
+}
+
+pliant_status pliant_body_set_velocities(pliant_body *body, const pliant_vec3 *v)
+{
+    return set_all(body, v, body->v);
+}
+
+pliant_vec3 pliant_body_position(const pliant_body *body, int32_t particle)
+{
+    if (particle < 0 || particle >= body->lattice->particle_count) return (pliant_vec3){0, 0, 0};
+    return pliant_body_get(body->x, body->lattice->slot[particle]);
+}
+
+pliant_status pliant_body_set_gravity(pliant_body *body, pliant_vec3 gravity)
+{
+    if (!is_finite(gravity)) return PLIANT_ERR_ARGUMENT;
+    body->gravity = gravity;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_body_set_damping(pliant_body *body, float damping, int32_t interval)
+{
+    if (!(damping >= 0 && damping <= 1) || interval < 1) return PLIANT_ERR_ARGUMENT;
+    body->damping = damping;
+    body->damping_interval = interval;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_body_set_rigid_damping(pliant_body *body, float damping)
+{
+    if (!(damping >= 0 && damping <= 1)) return PLIANT_ERR_ARGUMENT;
+    body->rigid_damping = damping;
+    return PLIANT_OK;
+}
+
+// array += value / mass of the particle.
+static pliant_status add_by_mass(const pliant_body *body, int32_t particle, pliant_vec3 value,
+                                 float *array)
+{
+    if (particle < 0 || particle >= body->lattice->particle_count || !is_finite(value))
+        return PLIANT_ERR_ARGUMENT;
+    const int32_t slot = body->lattice->slot[particle], block = slot / (3 * PLIANT_LANES);
+    const float inverse = body->lattice->lane_inverse[block * PLIANT_LANES + slot % PLIANT_LANES];
+    const pliant_vec3 old = pliant_body_get(array, slot);
+    pliant_body_set(array, slot,
+                    (pliant_vec3){old.x + inverse * value.x, old.y + inverse * value.y,
+                                  old.z + inverse * value.z});
+    return PLIANT_OK;
+}
+
+pliant_status pliant_body_force(pliant_body *body, int32_t particle, pliant_vec3 force)
+{
+    const pliant_status status = add_by_mass(body, particle, force, body->acceleration);
+    if (status >= 0) body->has_forces = 1;
+    return status;
+}
+
+pliant_status pliant_body_impulse(pliant_body *body, int32_t particle, pliant_vec3 impulse)
+{
+    return add_by_mass(body, particle, impulse, body->v);
+}
+
+pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from)
+{
+    if (to->lattice != from->lattice) return PLIANT_ERR_ARGUMENT;
+    const size_t lanes = (size_t)from->lattice->block_count * PLIANT_LANES;
+    memcpy(to->x, from->x, 3 * lanes * sizeof *to->x);
+    memcpy(to->v, from->v, 3 * lanes * sizeof *to->v);
+    memcpy(to->acceleration, from->acceleration, 3 * lanes * sizeof *to->acceleration);
+    memcpy(to->quaternion, from->quaternion, 4 * lanes * sizeof *to->quaternion);
+    to->has_forces = from->has_forces;
+    to->gravity = from->gravity;
+    to->step_count = from->step_count;
+    return PLIANT_OK;
+}
+
+// ---- Motion ----
+
+pliant_body_motion pliant_body_measure(const pliant_body *body)
+{
+    const pliant_lattice *lattice = body->lattice;
+    pliant_body_motion m = {0};
+    for (int32_t p = 0; p < lattice->particle_count; p++) {
+        const double mass = pliant_lattice_particle_mass(lattice, p);
+        m.mass += mass;
+        for (int c = 0; c < 3; c++) {
+            const double v = body->v[lattice->slot[p] + PLIANT_LANES * c];
+            m.centre[c] += mass * body->x[lattice->slot[p] + PLIANT_LANES * c];
+            m.momentum[c] += mass * v;
+            m.kinetic_energy += mass * v * v / 2;
+        }
+    }
+    for (int c = 0; c < 3; c++) m.centre[c] /= m.mass;
+    for (int32_t p = 0; p < lattice->particle_count; p++) {
+        const double mass = pliant_lattice_particle_mass(lattice, p);
+        double x[3], v[3];
+        for (int c = 0; c < 3; c++) {
+            x[c] = body->x[lattice->slot[p] + PLIANT_LANES * c] - m.centre[c];
+            v[c] = body->v[lattice->slot[p] + PLIANT_LANES * c];
+        }
+        for (int c = 0; c < 3; c++)
+            m.angular_momentum[c] +=
+                mass * (x[(c + 1) % 3] * v[(c + 2) % 3] - x[(c + 2) % 3] * v[(c + 1) % 3]);
+    }
+    return m;
+}
+
 // ---- Step ----
 
 typedef struct match_task {
@@ -227,7 +365,11 @@ void pliant_body_move(pliant_body *body, float h)
 {
     const int64_t start = pliant_clock_ns();
     const size_t count = (size_t)body->lattice->block_count * 3 * PLIANT_LANES;
-    for (size_t i = 0; i < count; i++) body->x[i] += h * body->v[i];
+    const float extent = PLIANT_BODY_EXTENT * body->lattice->cell_size;
+    for (size_t i = 0; i < count; i++) {
+        const float x = body->x[i] + h * body->v[i];
+        body->x[i] = x > extent ? extent : x < -extent ? -extent : x;
+    }
     body->step_count++;
     body->times.move = pliant_clock_ns() - start;
 }

@@ -464,7 +464,98 @@ void pliant_lattice_destroy(pliant_lattice *lattice)
     free(lattice);
 }
 
+// ---- From a model ----
+
+// Regions of another half-width than the file's are found again.
+static pliant_status find_regions(const pliant_model_view *view, const pliant_lattice_shape *shape,
+                                  int32_t half_width, pliant_regions **found,
+                                  pliant_regions *stored, pliant_error *err)
+{
+    if (half_width != 0 && half_width != view->lattice_half_width)
+        return pliant_regions_create(shape, half_width, found, err);
+    int32_t region_count = 0;
+    for (int32_t i = 0; i < view->lattice_particle_count; i++)
+        region_count += view->lattice_region_share[i] == i;
+    // What the file maps is only read.
+    *stored = (pliant_regions){
+        .half_width = view->lattice_half_width,
+        .particle_count = view->lattice_particle_count,
+        .region_count = region_count,
+        .size = (int32_t *)view->lattice_region_size,
+        .share = (int32_t *)view->lattice_region_share,
+        .region_node_count = view->lattice_region_node_count,
+        .plate_node_count = view->lattice_plate_node_count,
+        .region_nodes = (int32_t *)view->lattice_region_nodes,
+        .plate_nodes = (int32_t *)view->lattice_plate_nodes,
+    };
+    return PLIANT_OK;
+}
+
+pliant_status pliant_lattice_create(const pliant_model *model, int32_t half_width,
+                                    pliant_lattice **result, pliant_error *err)
+{
+    if (!model || !result)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "pliant_lattice_create: expected a model and a place, found NULL");
+    const char *name = pliant_reader_name(model->reader);
+    const pliant_model_view *view = &model->view;
+    if (view->lattice_particle_count == 0)
+        return pliant_error_set(
+            err, PLIANT_ERR_MISSING,
+            "%s: expected a lattice, found Green's functions alone (pliant-precompute --lattice "
+            "makes one)",
+            name);
+    if (half_width < 0 || half_width > PLIANT_LATTICE_WIDTH_LIMIT)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "half-width: expected 1 to %d, or 0 for the file's, found %d",
+                                PLIANT_LATTICE_WIDTH_LIMIT, half_width);
+    pliant_lattice_def def = {
+        .shape = {.dims = {view->lattice_dims[0], view->lattice_dims[1], view->lattice_dims[2]},
+                  .particle_count = view->lattice_particle_count,
+                  .cell_count = view->lattice_cell_count,
+                  .particles = view->lattice_particles,
+                  .cells = view->lattice_cells},
+        .mass = view->lattice_mass,
+        .cell_size = view->lattice_frame[PLIANT_LATTICE_CELL_SIZE],
+        .component_count = view->lattice_summary[PLIANT_LATTICE_COMPONENT_COUNT],
+        .is_shell = view->lattice_summary[PLIANT_LATTICE_IS_SHELL],
+    };
+    for (int c = 0; c < 3; c++) def.origin[c] = view->lattice_frame[PLIANT_LATTICE_ORIGIN + c];
+    pliant_error reason = {""};
+    pliant_regions *found = NULL, stored;
+    pliant_status status = find_regions(view, &def.shape, half_width, &found, &stored, &reason);
+    def.regions = found ? found : &stored;
+    if (status >= 0) status = pliant_lattice_build(&def, result, &reason);
+    pliant_regions_destroy(found);
+    if (status < 0) return pliant_error_set(err, status, "%s: %.400s", name, reason.text);
+    (*result)->model = model;
+    return PLIANT_OK;
+}
+
 // ---- Questions ----
+
+pliant_lattice_info pliant_lattice_describe(const pliant_lattice *lattice)
+{
+    return (pliant_lattice_info){
+        .particle_count = lattice->particle_count,
+        .cell_count = lattice->cell_count,
+        .component_count = lattice->component_count,
+        .half_width = lattice->half_width,
+        .region_count = lattice->region_count,
+        .irregular_count = lattice->irregular_count,
+        .is_shell = lattice->is_shell,
+        .dims = {lattice->dims[0], lattice->dims[1], lattice->dims[2]},
+        .cell_size = (double)lattice->cell_size,
+        .mass = lattice->mass,
+    };
+}
+
+double pliant_lattice_particle_mass(const pliant_lattice *lattice, int32_t particle)
+{
+    if (particle < 0 || particle >= lattice->particle_count) return 0;
+    const int32_t slot = lattice->slot[particle], block = slot / (3 * PLIANT_LANES);
+    return (double)lattice->lane_mass[block * PLIANT_LANES + slot % PLIANT_LANES];
+}
 
 const float *pliant_lattice_positions(const pliant_lattice *lattice)
 {

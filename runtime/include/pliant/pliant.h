@@ -576,3 +576,32 @@ PLIANT_API void pliant_body_destroy(pliant_body *body);  // NULL is fine
 // Advance by h > 0 seconds: v += (g - x) / h + h f / m, damping, x += h v (LSM-1, 2), fracture. The
 // same bits from any number of threads. Allocates nothing.
 PLIANT_CALL pliant_status pliant_body_step(pliant_body *body, float h);
+
+// Shape [particle_count] each, in the order of pliant_lattice_positions; m, m/s. What is not finite
+// is PLIANT_ERR_ARGUMENT.
+PLIANT_API void pliant_body_positions(const pliant_body *body, pliant_vec3 *x);
+PLIANT_API void pliant_body_velocities(const pliant_body *body, pliant_vec3 *v);
+PLIANT_CALL pliant_status pliant_body_set_positions(pliant_body *body, const pliant_vec3 *x);
+PLIANT_CALL pliant_status pliant_body_set_velocities(pliant_body *body, const pliant_vec3 *v);
+PLIANT_API pliant_vec3 pliant_body_position(const pliant_body *body, int32_t particle);
+// Make `to` what `from` is, bit for bit, for later or for another: positions, velocities,
+// rotations, broken links. Both are instances of one lattice, and `to` is breakable if `from` is.
+PLIANT_CALL pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from);
+
+PLIANT_CALL pliant_status pliant_body_set_gravity(pliant_body *body, pliant_vec3 gravity);  // m/s^2
+// k = 0 to 1, every `interval` steps.
+PLIANT_CALL pliant_status pliant_body_set_damping(pliant_body *body, float k, int32_t interval);
+PLIANT_CALL pliant_status pliant_body_set_rigid_damping(pliant_body *body, float k);
+// Added to what acts on a particle in the next step, N; at once, N s.
+PLIANT_CALL pliant_status pliant_body_force(pliant_body *body, int32_t particle, pliant_vec3 force);
+PLIANT_CALL pliant_status pliant_body_impulse(pliant_body *body, int32_t particle,
+                                              pliant_vec3 impulse);
+
+typedef struct pliant_body_motion {
+    double mass;                 // kg
+    double centre[3];            // of mass, m
+    double momentum[3];          // kg m/s
+    double angular_momentum[3];  // about the centre of mass, kg m^2/s
+    double kinetic_energy;       // J
+} pliant_body_motion;
+PLIANT_API pliant_body_motion pliant_body_measure(const pliant_body *body);
