@@ -232,6 +232,12 @@ int32_t pliant_links_has(const pliant_links *links, int32_t x, int32_t y, int32_
     return has_bit(row_bits(links, row, ROW_LINKS + d), x);
 }
 
+uint32_t pliant_links_row(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d)
+{
+    const int32_t row = row_at(links, y, z);
+    return row < 0 || x >= links->dims[0] ? 0 : window_bits(row_bits(links, row, ROW_LINKS + d), x);
+}
+
 uint32_t pliant_links_mask(const pliant_links *links, int32_t x, int32_t y, int32_t z)
 {
     uint32_t mask = 0;

@@ -2,6 +2,7 @@
 #include "lattice/body.h"
 
 #include "lattice/columns.h"
+#include "lattice/damping.h"
 #include "lattice/plates.h"
 #include "lattice/window.h"
 #include "pliant/error.h"
@@ -12,7 +13,7 @@
 
 // ---- Life ----
 
-static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice,
+static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice, int32_t regions,
                             pliant_scratch *scratch)
 {
     const int32_t w = lattice->half_width;
@@ -24,7 +25,6 @@ static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice,
         if (rows[1] - rows[0] > most_rows) most_rows = rows[1] - rows[0];
     }
     const size_t length = pliant_row_length(lattice->row_blocks);
-    const int32_t regions = lattice->column_regions;
     const int32_t strip = (longest > lattice->dims[1] ? longest : lattice->dims[1]) + 4 * w;
     PLIANT_TAKE(arena, scratch->rows, 6 * length * most_rows);
     PLIANT_TAKE(arena, scratch->bars,
@@ -36,24 +36,38 @@ static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice,
     PLIANT_TAKE(arena, scratch->strip, strip);
     PLIANT_TAKE(arena, scratch->repairs, (size_t)longest * 13 * PLIANT_LANES);
     PLIANT_TAKE(arena, scratch->repair_of, longest);
+    PLIANT_TAKE(arena, scratch->fit_rows, 15 * length);
+    PLIANT_TAKE(arena, scratch->fit_bars,
+                (size_t)lattice->row_blocks * lattice->dims[1] * 15 * PLIANT_LANES);
+    PLIANT_TAKE(arena, scratch->fit_repairs, (size_t)longest * 16 * PLIANT_LANES);
 }
 
 static void lay_out(pliant_arena *arena, pliant_body *body)
 {
     const pliant_lattice *lattice = body->lattice;
     const size_t lanes = (size_t)lattice->block_count * PLIANT_LANES;
+    const size_t plates = (size_t)body->irregular->plate_capacity + 1;
     PLIANT_TAKE(arena, body->x, 3 * lanes);
     PLIANT_TAKE(arena, body->v, 3 * lanes);
     PLIANT_TAKE(arena, body->acceleration, 3 * lanes);
     PLIANT_TAKE(arena, body->quaternion, 4 * lanes);
     PLIANT_TAKE(arena, body->sites, (size_t)lattice->site_count * PLIANT_SITE_FLOATS);
-    PLIANT_TAKE(arena, body->plate_sums, 9 * (size_t)lattice->irregular.plate_capacity + 9);
+    PLIANT_TAKE(arena, body->plate_sums, 9 * plates);
     PLIANT_TAKE(arena, body->weighed, 4 * (size_t)lattice->exceptions.count);
     PLIANT_TAKE(arena, body->listed_turns, 16 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->fit_sites, (size_t)lattice->site_count * 15 * PLIANT_LANES);
+    PLIANT_TAKE(arena, body->fit_plates, 15 * plates);
+    PLIANT_TAKE(arena, body->listed_fits, 16 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->slab_sums, 16 * (size_t)lattice->dims[2]);
     PLIANT_TAKE(arena, body->scratch, body->worker_count);
+    // Of regions made of parts a column of a breakable body may have one for every particle.
+    int32_t regions = lattice->column_regions;
+    for (int32_t c = 0; body->fracture && c < lattice->column_count; c++)
+        if (lattice->columns[c].length * PLIANT_LANES > regions)
+            regions = lattice->columns[c].length * PLIANT_LANES;
     for (int32_t k = 0; k < body->worker_count; k++) {
         pliant_scratch none = {0};
-        lay_out_scratch(arena, lattice, arena->base ? &body->scratch[k] : &none);
+        lay_out_scratch(arena, lattice, regions, arena->base ? &body->scratch[k] : &none);
     }
 }
 
@@ -142,6 +156,14 @@ pliant_status pliant_body_create(const pliant_lattice *lattice, const pliant_bod
     body->constants = lattice->constants;
     body->irregular = &lattice->irregular;
     body->is_listed = lattice->exceptions.is_listed;
+    if (def->strain_limit > 0) {
+        status = pliant_fracture_create(lattice, def->thread_count, &body->fracture, err);
+        if (status < 0) goto done;
+        body->constants_of = body->fracture->constants_of;
+        body->constants = body->fracture->constants;
+        body->irregular = &body->fracture->irregular;
+        body->is_listed = body->fracture->is_listed;
+    }
     lay_out(&body->arena, body);
     status = pliant_arena_reserve(&body->arena, err);
     if (status < 0) goto done;
@@ -161,6 +183,7 @@ void pliant_body_destroy(pliant_body *body)
 {
     if (!body) return;
     pliant_team_destroy(body->team);
+    pliant_fracture_destroy(body->fracture);
     pliant_arena_release(&body->arena);
     free(body);
 }
@@ -224,6 +247,19 @@ pliant_status pliant_body_set_damping(pliant_body *body, float damping, int32_t 
     return PLIANT_OK;
 }
 
+pliant_status pliant_body_set_strain_limit(pliant_body *body, float limit)
+{
+    if (!(limit > 0)) return PLIANT_ERR_ARGUMENT;
+    if (!body->fracture) return PLIANT_ERR_MISSING;
+    body->strain_limit = limit;
+    return PLIANT_OK;
+}
+
+int64_t pliant_body_broken_count(const pliant_body *body)
+{
+    return body->fracture ? body->fracture->cut_count : 0;
+}
+
 pliant_status pliant_body_set_rigid_damping(pliant_body *body, float damping)
 {
     if (!(damping >= 0 && damping <= 1)) return PLIANT_ERR_ARGUMENT;
@@ -260,7 +296,8 @@ pliant_status pliant_body_impulse(pliant_body *body, int32_t particle, pliant_ve
 
 pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from)
 {
-    if (to->lattice != from->lattice) return PLIANT_ERR_ARGUMENT;
+    if (to->lattice != from->lattice || (from->fracture && !to->fracture))
+        return PLIANT_ERR_ARGUMENT;
     const size_t lanes = (size_t)from->lattice->block_count * PLIANT_LANES;
     memcpy(to->x, from->x, 3 * lanes * sizeof *to->x);
     memcpy(to->v, from->v, 3 * lanes * sizeof *to->v);
@@ -269,6 +306,8 @@ pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from)
     to->has_forces = from->has_forces;
     to->gravity = from->gravity;
     to->step_count = from->step_count;
+    if (from->fracture) pliant_fracture_copy(to->fracture, from->fracture, from->lattice);
+    else if (to->fracture) pliant_fracture_mend(to->fracture, from->lattice);
     return PLIANT_OK;
 }
 
@@ -359,6 +398,10 @@ void pliant_body_match(pliant_body *body, float h)
                (size_t)body->lattice->block_count * 3 * PLIANT_LANES * sizeof(float));
         body->has_forces = 0;
     }
+    if (body->damping > 0 && body->step_count % body->damping_interval == 0)
+        pliant_body_damp(body, body->damping);
+    if (body->rigid_damping > 0) pliant_body_damp_rigid(body, body->rigid_damping);
+    body->times.damping = pliant_clock_ns() - scattered;
 }
 
 void pliant_body_move(pliant_body *body, float h)
@@ -370,6 +413,7 @@ void pliant_body_move(pliant_body *body, float h)
         const float x = body->x[i] + h * body->v[i];
         body->x[i] = x > extent ? extent : x < -extent ? -extent : x;
     }
+    if (body->fracture) (void)pliant_fracture_break(body);
     body->step_count++;
     body->times.move = pliant_clock_ns() - start;
 }

@@ -7,6 +7,7 @@
 // particle stay 0.
 #pragma once
 
+#include "lattice/fracture.h"
 #include "lattice/lattice.h"
 #include "lattice/team.h"
 
@@ -37,17 +38,23 @@ struct pliant_body {
     int32_t damping_interval;
     pliant_body_times times;
 
-    // What of the lattice the body uses: the lattice's own until it breaks.
+    // What of the lattice the body uses: the lattice's own, or what may break.
     const int32_t *constants_of;
     const pliant_block_constants *constants;
     const pliant_irregular *irregular;
-    const uint8_t *is_listed;  // of exceptions
+    const uint8_t *is_listed;   // of exceptions
+    pliant_fracture *fracture;  // owned; NULL: unbreakable
 
     // Scratch of a step.
     float *sites;         // shape [site][9][8]: sums over plates, then what comes back to them
     float *plate_sums;    // shape [plate][9]
     float *weighed;       // shape [exception][4]: m~ (x - origin)
     float *listed_turns;  // shape [exception][4][4]: p, a, b, c of T_r; 0 where parts are used
+    // The same of damping.
+    float *fit_sites;                // shape [site][15][8]
+    float *fit_plates;               // shape [plate][15]
+    float *listed_fits;              // shape [exception][16]
+    double *slab_sums;               // shape [dims z][16]
     struct pliant_scratch *scratch;  // shape [worker]
     int32_t worker_count;
     pliant_team *team;  // owned; NULL: the caller alone
@@ -65,6 +72,9 @@ typedef struct pliant_scratch {
     float *repairs;       // shape [longest column][13][8]: what mends a block's sums
     int32_t *repair_of;   // shape [longest column]: which, or -1
     const float **strip;  // rows of a window
+    float *fit_rows;      // 15 padded rows
+    float *fit_bars;      // shape [row_blocks][dims y][15][8]
+    float *fit_repairs;   // shape [longest column][16][8]
 } pliant_scratch;
 
 // v += (g - x) / h + h (gravity + a); then damping.

@@ -19,6 +19,7 @@
 // Eight lanes; loads and stores anywhere. The compiler lowers it to what the machine has.
 typedef float pliant_f8 __attribute__((vector_size(32), may_alias));
 typedef float pliant_f8_anywhere __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int32_t pliant_bits8 __attribute__((vector_size(32)));
 typedef float pliant_f4 __attribute__((vector_size(16), aligned(4), may_alias));
 #define PLIANT_INLINE static inline __attribute__((always_inline))
 

@@ -48,6 +48,8 @@ void pliant_links_destroy(pliant_links *links);                            // NU
 int32_t pliant_links_particle(const pliant_links *links, int32_t x, int32_t y, int32_t z);  // -1
 // 1: the particle at (x, y, z) is linked along direction d.
 int32_t pliant_links_has(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
+// Bit k: the particle at (x + k, y, z) is linked along direction d; 32 of them, x >= 0.
+uint32_t pliant_links_row(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
 void pliant_links_cut(pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
 // The directions that (x, y, z) is linked along, bit d for direction d.
 uint32_t pliant_links_mask(const pliant_links *links, int32_t x, int32_t y, int32_t z);

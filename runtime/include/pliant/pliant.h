@@ -592,6 +592,9 @@ PLIANT_CALL pliant_status pliant_body_set_gravity(pliant_body *body, pliant_vec3
 // k = 0 to 1, every `interval` steps.
 PLIANT_CALL pliant_status pliant_body_set_damping(pliant_body *body, float k, int32_t interval);
 PLIANT_CALL pliant_status pliant_body_set_rigid_damping(pliant_body *body, float k);
+// Of a body that was created with one; PLIANT_ERR_MISSING: it was not.
+PLIANT_CALL pliant_status pliant_body_set_strain_limit(pliant_body *body, float limit);
+PLIANT_API int64_t pliant_body_broken_count(const pliant_body *body);  // links broken so far
 // Added to what acts on a particle in the next step, N; at once, N s.
 PLIANT_CALL pliant_status pliant_body_force(pliant_body *body, int32_t particle, pliant_vec3 force);
 PLIANT_CALL pliant_status pliant_body_impulse(pliant_body *body, int32_t particle,
