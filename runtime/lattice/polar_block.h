@@ -33,7 +33,7 @@ typedef float pliant_polar_memory __attribute__((vector_size(32), aligned(4), ma
 // > 1e-6 |A| or so, and its sign is no matter of round-off.
 #define PLIANT_POLAR_DEFINITE 2e-5f
 // Blocks that one call of pliant_polar_try may take, phase by phase: a block is one long chain of
-// operations, so that a core has the time for another in between (bench_polar: 10 to 15%).
+// operations, so that a core has the time for another in between (bench_polar: 25%).
 #define PLIANT_POLAR_GROUP 3
 // A start further from |q|^2 = 1 than this is none; nearer, one Newton step makes it a unit.
 #define PLIANT_POLAR_UNIT 1e-3f
@@ -157,90 +157,99 @@ PLIANT_POLAR_INLINE void pliant_polar_start(const float *q, pliant_polar_lanes s
 
 // What a block carries from phase to phase of pliant_polar_try.
 typedef struct pliant_polar_work {
-    pliant_polar_lanes m[9], q[4], turn[4], r[9], length;
+    pliant_polar_lanes m[9];            // A, scaled
+    pliant_polar_lanes q[4], to[4];     // the start, and where it leads, of any length
+    pliant_polar_lanes r[9], twice;     // the matrix of one of them, and 2 / its |q|^2
+    pliant_polar_lanes turn[4], shift;  // p and 1, and lambda - tr B
     pliant_polar_masks kept;
     pliant_polar_frame f;
 } pliant_polar_work;
 
-PLIANT_POLAR_INLINE void pliant_polar_begin(const float *a, const float *q, pliant_polar_work *work)
+// lambda - tr B = z . p / (1 + |p|^2) by the first solution.
+PLIANT_POLAR_INLINE void pliant_polar_shift(pliant_polar_work *w)
 {
-    pliant_polar_lanes twice;
-    pliant_polar_scale(a, work->m, &work->kept);
-    pliant_polar_start(q, work->q, &twice);
-    pliant_polar_matrix(work->q, &twice, work->r);
-    pliant_polar_look(work->r, work->m, &work->f);
+    const pliant_polar_lanes *z = w->f.z, *p = w->turn;
+    pliant_polar_lanes length;
+    pliant_polar_square(p, &length);
+    w->shift = (z[0] * p[0] + (z[1] * p[1] + z[2] * p[2])) * p[3] / length;
 }
 
-// lambda - tr B = z . p / (1 + |p|^2) by a first solution, for the second.
-PLIANT_POLAR_INLINE void pliant_polar_step(pliant_polar_work *work)
+// Lanes that keep their rotation do not turn.
+PLIANT_POLAR_INLINE void pliant_polar_turn(pliant_polar_work *w)
 {
-    const pliant_polar_lanes *z = work->f.z;
-    pliant_polar_lanes shift = {0}, length, turn[4];
-    pliant_polar_solve(&work->f, &shift, turn);
-    pliant_polar_square(turn, &length);
-    shift = (z[0] * turn[0] + (z[1] * turn[1] + z[2] * turn[2])) * turn[3] / length;
-    pliant_polar_solve(&work->f, &shift, turn);
-    for (int i = 0; i < 4; i++)
-        work->turn[i] = (pliant_polar_lanes)((pliant_polar_masks)turn[i] & ~work->kept);
-    work->turn[3] =
-        (pliant_polar_lanes)((pliant_polar_masks)work->turn[3] | (work->kept & 0x3f800000));
+    for (int i = 0; i < 4; i++) {
+        w->turn[i] = (pliant_polar_lanes)((pliant_polar_masks)w->turn[i] & ~w->kept);
+        w->to[i] = w->q[i];
+    }
+    w->turn[3] = (pliant_polar_lanes)((pliant_polar_masks)w->turn[3] | (w->kept & 0x3f800000));
+    pliant_polar_apply(w->turn, w->to);
+    pliant_polar_lanes length;
+    pliant_polar_square(w->to, &length);
+    w->twice = 2 / length;
 }
 
-PLIANT_POLAR_INLINE void pliant_polar_turn(pliant_polar_work *work, pliant_polar_lanes to[4])
+// Which lanes are done: comparisons that numbers that are none fail.
+PLIANT_POLAR_INLINE void pliant_polar_judge(const pliant_polar_work *w, pliant_polar_masks *done)
 {
-    for (int i = 0; i < 4; i++) to[i] = work->q[i];
-    pliant_polar_apply(work->turn, to);
-    pliant_polar_square(to, &work->length);
-    const pliant_polar_lanes twice = 2 / work->length;
-    pliant_polar_matrix(to, &twice, work->r);
-    pliant_polar_look(work->r, work->m, &work->f);
-}
-
-// Takes what came of it where it is good: comparisons that numbers that are none fail.
-PLIANT_POLAR_INLINE int32_t pliant_polar_end(pliant_polar_work *work, pliant_polar_lanes to[4],
-                                             float *q, float *rotation, int32_t missed[8])
-{
-    const pliant_polar_frame *f = &work->f;
-    pliant_polar_lanes size = {0}, inverse;
-    for (int i = 0; i < 9; i++) size += work->m[i] * work->m[i];
+    const pliant_polar_frame *f = &w->f;
+    pliant_polar_lanes size = {0};
+    for (int i = 0; i < 9; i++) size += w->m[i] * w->m[i];
     const pliant_polar_lanes residual = f->z[0] * f->z[0] + (f->z[1] * f->z[1] + f->z[2] * f->z[2]);
     const pliant_polar_lanes minor = f->diagonal[0] * f->diagonal[1] - f->xy * f->xy;
     const pliant_polar_lanes determinant = f->diagonal[2] * minor -
                                            f->yz * (f->diagonal[0] * f->yz + f->xy * f->xz) -
                                            f->xz * (f->diagonal[1] * f->xz + f->xy * f->yz);
-    const pliant_polar_masks done =
-        work->kept |
-        ((residual <= PLIANT_POLAR_RESIDUAL * PLIANT_POLAR_RESIDUAL * size) &
-         (f->diagonal[0] > 0.0f) & (minor > 0.0f) & (determinant >= PLIANT_POLAR_DEFINITE * size));
-    // A unit on the start's side.
-    pliant_polar_inverse_root(&work->length, &inverse);
+    *done = w->kept | ((residual <= PLIANT_POLAR_RESIDUAL * PLIANT_POLAR_RESIDUAL * size) &
+                       (f->diagonal[0] > 0.0f) & (minor > 0.0f) &
+                       (determinant >= PLIANT_POLAR_DEFINITE * size));
+}
+
+// Takes the unit quaternion on the start's side where the lane is done.
+PLIANT_POLAR_INLINE int32_t pliant_polar_take(pliant_polar_work *w, const pliant_polar_masks *done,
+                                              float *q, float *rotation, int32_t missed[8])
+{
+    const pliant_polar_lanes half = 0.5f * w->twice;  // 1 / |to|^2
+    pliant_polar_lanes root;
+    pliant_polar_inverse_root(&half, &root);
+    pliant_polar_lanes inverse = half * root;
     inverse = (pliant_polar_lanes)((pliant_polar_masks)inverse ^
-                                   ((pliant_polar_masks)work->turn[3] & (int32_t)0x80000000));
+                                   ((pliant_polar_masks)w->turn[3] & (int32_t)0x80000000));
     for (int i = 0; i < 4; i++) {
-        const pliant_polar_lanes unit = inverse * to[i];
-        pliant_polar_put(&done, &unit, &work->q[i]);
-        *(pliant_polar_memory *)(q + 8 * i) = work->q[i];
+        const pliant_polar_lanes unit = inverse * w->to[i];
+        pliant_polar_put(done, &unit, &w->q[i]);
+        *(pliant_polar_memory *)(q + 8 * i) = w->q[i];
     }
-    for (int i = 0; i < 9; i++) *(pliant_polar_memory *)(rotation + 8 * i) = work->r[i];
-    const pliant_polar_masks misses = ~done;
+    for (int i = 0; i < 9; i++) *(pliant_polar_memory *)(rotation + 8 * i) = w->r[i];
+    const pliant_polar_masks misses = ~*done;
     *(pliant_polar_memory *)missed = (pliant_polar_lanes)misses;
     const pliant_polar_pairs pairs = (pliant_polar_pairs)misses;
     return (pairs[0] | pairs[1] | pairs[2] | pairs[3]) != 0;
 }
 
-// One step for `count` blocks of eight lanes (a constant); a, q and rotation hold them one after
-// another, shaped as in polar.h. Lanes that are not done keep their start and have missed[lane]
-// != 0, and no rotation: pliant_polar_finish. Returns whether there are any.
+// One step for `count` blocks of eight lanes (a constant, at most PLIANT_POLAR_GROUP); a, q and
+// rotation hold them one after another, shaped as in polar.h. Lanes that are not done keep their
+// start and have missed[lane] != 0, and no rotation: pliant_polar_finish. Returns whether there are
+// any.
 PLIANT_POLAR_INLINE int32_t pliant_polar_try(int count, const float *a, float *q, float *rotation,
                                              int32_t *missed)
 {
-    pliant_polar_work work[PLIANT_POLAR_GROUP];
-    pliant_polar_lanes to[PLIANT_POLAR_GROUP][4];
+    pliant_polar_work work[PLIANT_POLAR_GROUP], *const end = work + count;
+    const pliant_polar_lanes none = {0};
     int32_t any = 0;
-    for (int b = 0; b < count; b++) pliant_polar_begin(a + 72 * b, q + 32 * b, &work[b]);
-    for (int b = 0; b < count; b++) pliant_polar_step(&work[b]);
-    for (int b = 0; b < count; b++) pliant_polar_turn(&work[b], to[b]);
-    for (int b = 0; b < count; b++)
-        any |= pliant_polar_end(&work[b], to[b], q + 32 * b, rotation + 72 * b, missed + 8 * b);
+    for (int b = 0; b < count; b++) pliant_polar_scale(a + 72 * b, work[b].m, &work[b].kept);
+    for (int b = 0; b < count; b++) pliant_polar_start(q + 32 * b, work[b].q, &work[b].twice);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_matrix(w->q, &w->twice, w->r);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_look(w->r, w->m, &w->f);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_solve(&w->f, &none, w->turn);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_shift(w);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_solve(&w->f, &w->shift, w->turn);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_turn(w);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_matrix(w->to, &w->twice, w->r);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_look(w->r, w->m, &w->f);
+    for (int b = 0; b < count; b++) {
+        pliant_polar_masks done;
+        pliant_polar_judge(&work[b], &done);
+        any |= pliant_polar_take(&work[b], &done, q + 32 * b, rotation + 72 * b, missed + 8 * b);
+    }
     return any;
 }

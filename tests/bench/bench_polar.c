@@ -40,15 +40,22 @@ typedef struct regions {
 static PLIANT_VECTOR_CLONES void solve_once(regions *set)
 {
     for (int b = 0; b < BLOCKS; b++) {
-        pliant_polar_work work;
-        lanes to[4], inverse;
-        const lanes none = {0};
-        pliant_polar_begin(set->a + 72 * b, set->q + 32 * b, &work);
-        pliant_polar_solve(&work.f, &none, work.turn);
-        pliant_polar_turn(&work, to);
-        pliant_polar_inverse_root(&work.length, &inverse);
-        for (int i = 0; i < 4; i++) STORE(set->q + 32 * b + 8 * i, inverse * to[i]);
-        for (int i = 0; i < 9; i++) STORE(set->r + 72 * b + 8 * i, work.r[i]);
+        pliant_polar_lanes m[9], q[4], r[9], turn[4], twice, length, inverse;
+        const pliant_polar_lanes none = {0};
+        pliant_polar_masks kept;
+        pliant_polar_frame f;
+        pliant_polar_scale(set->a + 72 * b, m, &kept);
+        pliant_polar_start(set->q + 32 * b, q, &twice);
+        pliant_polar_matrix(q, &twice, r);
+        pliant_polar_look(r, m, &f);
+        pliant_polar_solve(&f, &none, turn);
+        pliant_polar_apply(turn, q);
+        pliant_polar_square(q, &length);
+        pliant_polar_inverse_root(&length, &inverse);
+        twice = 2 / length;
+        pliant_polar_matrix(q, &twice, r);
+        for (int i = 0; i < 4; i++) STORE(set->q + 32 * b + 8 * i, inverse * q[i]);
+        for (int i = 0; i < 9; i++) STORE(set->r + 72 * b + 8 * i, r[i]);
     }
 }
 
