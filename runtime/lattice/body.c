@@ -50,7 +50,7 @@ static void lay_out(pliant_arena *arena, pliant_body *body)
     PLIANT_TAKE(arena, body->x, 3 * lanes);
     PLIANT_TAKE(arena, body->v, 3 * lanes);
     PLIANT_TAKE(arena, body->acceleration, 3 * lanes);
-    PLIANT_TAKE(arena, body->quaternion, 4 * lanes);
+    PLIANT_TAKE(arena, body->quaternion, 4 * (size_t)lattice->turn_count * PLIANT_LANES);
     PLIANT_TAKE(arena, body->sites, (size_t)lattice->site_count * PLIANT_SITE_FLOATS);
     PLIANT_TAKE(arena, body->plate_sums, 9 * plates);
     PLIANT_TAKE(arena, body->weighed, 4 * (size_t)lattice->exceptions.count);
@@ -128,10 +128,10 @@ static void place(pliant_body *body, const pliant_body_def *def)
         pliant_body_set(body->v, lattice->slot[p], def->velocity);
     }
     const float q[4] = {x, y, z, w};
-    for (int32_t b = 0; b < lattice->block_count; b++)
+    for (int32_t t = 0; t < lattice->turn_count; t++)
         for (int c = 0; c < 4; c++)
             for (int k = 0; k < PLIANT_LANES; k++)
-                body->quaternion[((size_t)b * 4 + c) * PLIANT_LANES + k] = q[c];
+                body->quaternion[((size_t)t * 4 + c) * PLIANT_LANES + k] = q[c];
 }
 
 pliant_status pliant_body_create(const pliant_lattice *lattice, const pliant_body_def *def,
@@ -152,15 +152,19 @@ pliant_status pliant_body_create(const pliant_lattice *lattice, const pliant_bod
     body->damping_interval = def->damping_interval;
     body->rigid_damping = def->rigid_damping;
     body->strain_limit = def->strain_limit;
-    body->constants_of = lattice->constants_of;
-    body->constants = lattice->constants;
+    body->particle_constants_of = lattice->particle_constants_of;
+    body->region_constants_of = lattice->region_constants_of;
+    body->particle_constants = lattice->particle_constants;
+    body->region_constants = lattice->region_constants;
     body->irregular = &lattice->irregular;
     body->is_listed = lattice->exceptions.is_listed;
     if (def->strain_limit > 0) {
         status = pliant_fracture_create(lattice, def->thread_count, &body->fracture, err);
         if (status < 0) goto done;
-        body->constants_of = body->fracture->constants_of;
-        body->constants = body->fracture->constants;
+        body->particle_constants_of = body->fracture->particle_constants_of;
+        body->region_constants_of = body->fracture->region_constants_of;
+        body->particle_constants = body->fracture->particle_constants;
+        body->region_constants = body->fracture->region_constants;
         body->irregular = &body->fracture->irregular;
         body->is_listed = body->fracture->is_listed;
     }
@@ -302,7 +306,8 @@ pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from)
     memcpy(to->x, from->x, 3 * lanes * sizeof *to->x);
     memcpy(to->v, from->v, 3 * lanes * sizeof *to->v);
     memcpy(to->acceleration, from->acceleration, 3 * lanes * sizeof *to->acceleration);
-    memcpy(to->quaternion, from->quaternion, 4 * lanes * sizeof *to->quaternion);
+    memcpy(to->quaternion, from->quaternion,
+           4 * (size_t)from->lattice->turn_count * PLIANT_LANES * sizeof *to->quaternion);
     to->has_forces = from->has_forces;
     to->gravity = from->gravity;
     to->step_count = from->step_count;

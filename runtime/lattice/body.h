@@ -28,7 +28,7 @@ struct pliant_body {
     const pliant_lattice *lattice;
     float *x, *v;         // shape [block][3][8], m, m/s
     float *acceleration;  // shape [block][3][8], m/s^2, of forces for the next step
-    float *quaternion;    // shape [block][4][8]: R_r of the last match
+    float *quaternion;    // shape [turn][4][8]: R_r of the last match
     int32_t has_forces;   // 1: acceleration holds something
     pliant_vec3 gravity;
     float origin[3];  // near the middle: sums are taken about it, m
@@ -39,8 +39,9 @@ struct pliant_body {
     pliant_body_times times;
 
     // What of the lattice the body uses: the lattice's own, or what may break.
-    const int32_t *constants_of;
-    const pliant_block_constants *constants;
+    const int32_t *particle_constants_of, *region_constants_of;
+    const pliant_particle_constants *particle_constants;
+    const pliant_region_constants *region_constants;
     const pliant_irregular *irregular;
     const uint8_t *is_listed;   // of exceptions
     pliant_fracture *fracture;  // owned; NULL: unbreakable

@@ -26,13 +26,13 @@ typedef struct repair {
 
 _Static_assert(sizeof(repair) == 13 * PLIANT_LANES * sizeof(float), "scratch is sized by this");
 
-static repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
+PLIANT_INLINE repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
 {
     repair *all = (repair *)(void *)scratch->repairs;
     if (scratch->repair_of[s] >= 0) return &all[scratch->repair_of[s]];
     repair *r = &all[scratch->repair_of[s] = (*count)++];
-    memset(r->more, 0, sizeof r->more);
-    for (int k = 0; k < PLIANT_LANES; k++) r->keep[k] = 1;
+    pliant_f8_store(r->keep, pliant_f8_all(1.0f));
+    for (int f = 0; f < 12; f++) pliant_f8_store(r->more[f], (pliant_f8){0});
     return r;
 }
 
@@ -113,40 +113,80 @@ PLIANT_INLINE void apply_repair(const pliant_scratch *scratch, int32_t s, float 
 
 // ---- Matching ----
 
-// c_r (LSM-9), A_r (LSM-11), R_r, T_r of the eight regions of a block:
+// Regions of a column are matched by threes: the rotations of one block are one long chain of
+// operations, which those of the next two fill.
+typedef struct match_group {
+    int32_t count;
+    const pliant_region_constants *constants[PLIANT_POLAR_GROUP];  // NULL: no block there
+    float sums[PLIANT_POLAR_GROUP][12 * PLIANT_LANES];
+    float a[PLIANT_POLAR_GROUP * 9 * PLIANT_LANES], rotation[PLIANT_POLAR_GROUP * 9 * PLIANT_LANES];
+    int32_t missed[PLIANT_POLAR_GROUP * PLIANT_LANES];
+} match_group;
+
+// A_r (LSM-11) of eight regions:
 //     A_r = sum of m~ x d^T - (sum of m~ x) d0^T, d = x0 - x0_r in cells, d0 = c0_r - x0_r
-PLIANT_INLINE void match_block(pliant_body *body, int32_t block, const float *sums, float *turn)
+PLIANT_INLINE void find_moments(match_group *group, int32_t i)
 {
-    const pliant_block_constants *constants = &body->constants[body->constants_of[block]];
+    const pliant_region_constants *constants = group->constants[i];
+    float *a = group->a + (size_t)i * 9 * PLIANT_LANES;
+    if (!constants) {
+        for (int f = 0; f < 9; f++) pliant_f8_store(a + 8 * f, (pliant_f8){0});
+        return;
+    }
+    const float *sums = group->sums[i];
     const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
-    const pliant_f8 inverse_mass = pliant_f8_load(constants->inverse_mass);
-    const pliant_f8 cell = pliant_f8_all(body->lattice->cell_size);
-    float a[9 * PLIANT_LANES], rotation[9 * PLIANT_LANES];
-    pliant_f8 offset[3];
-    for (int d = 0; d < 3; d++) offset[d] = pliant_f8_load(constants->offset[d]);
     for (int c = 0; c < 3; c++) {
         const pliant_f8 sum = pliant_f8_load(sums + 8 * c);
         for (int d = 0; d < 3; d++)
             pliant_f8_store(a + 8 * (3 * c + d),
-                            is_particle *
-                                (pliant_f8_load(sums + 8 * (3 + 3 * d + c)) - sum * offset[d]));
+                            is_particle * (pliant_f8_load(sums + 8 * (3 + 3 * d + c)) -
+                                           sum * pliant_f8_load(constants->offset[d])));
     }
-    float *q = body->quaternion + (size_t)block * 4 * PLIANT_LANES;
-    int32_t missed[PLIANT_LANES];
-    if (pliant_polar_try(1, a, q, rotation, missed)) pliant_polar_finish(a, missed, q, rotation);
-    const pliant_f8 scale = is_particle * cell;
+}
+
+// c_r (LSM-9) and T_r of eight regions.
+PLIANT_INLINE void find_turn(const match_group *group, int32_t i, float cell_size, float *turn)
+{
+    const pliant_region_constants *constants = group->constants[i];
+    if (!constants) {
+        for (int f = 0; f < 12; f++) pliant_f8_store(turn + 8 * f, (pliant_f8){0});
+        return;
+    }
+    const float *rotation = group->rotation + (size_t)i * 9 * PLIANT_LANES;
+    const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
+    const pliant_f8 inverse_mass = pliant_f8_load(constants->inverse_mass);
+    const pliant_f8 scale = is_particle * pliant_f8_all(cell_size);
     for (int c = 0; c < 3; c++) {
-        pliant_f8 goal = pliant_f8_load(sums + 8 * c) * inverse_mass;
+        pliant_f8 goal = pliant_f8_load(group->sums[i] + 8 * c) * inverse_mass;
         pliant_f8 axis[3];
         for (int d = 0; d < 3; d++) {
             axis[d] = scale * pliant_f8_load(rotation + 8 * (3 * c + d));
-            goal -= offset[d] * axis[d];
+            goal -= pliant_f8_load(constants->offset[d]) * axis[d];
         }
         pliant_f8_store(turn + 8 * (TURN_A + c), axis[0]);
         pliant_f8_store(turn + 8 * (TURN_B + c), axis[1]);
         pliant_f8_store(turn + 8 * (TURN_C + c), axis[2]);
         pliant_f8_store(turn + 8 * (TURN_P + c), is_particle * goal);
     }
+}
+
+PLIANT_INLINE void match_group_of(match_group *group, float cell_size, float *quaternions,
+                                  float *turns)
+{
+    for (int32_t i = 0; i < group->count; i++) find_moments(group, i);
+    int32_t any = 0;
+    if (group->count == PLIANT_POLAR_GROUP)
+        any = pliant_polar_try(PLIANT_POLAR_GROUP, group->a, quaternions, group->rotation,
+                               group->missed);
+    else
+        for (int32_t i = 0; i < group->count; i++)
+            any |= pliant_polar_try(1, group->a + 72 * i, quaternions + 32 * i,
+                                    group->rotation + 72 * i, group->missed + 8 * i);
+    for (int32_t i = 0; any && i < group->count; i++)
+        pliant_polar_finish(group->a + 72 * i, group->missed + 8 * i, quaternions + 32 * i,
+                            group->rotation + 72 * i);
+    for (int32_t i = 0; i < group->count; i++)
+        find_turn(group, i, cell_size, turns + (size_t)i * TURN_FLOATS);
 }
 
 // Sums over regions along z (LSM-7), and what is made of them.
@@ -160,26 +200,32 @@ PLIANT_INLINE void match_regions(pliant_body *body, int32_t column, float *turns
     for (int32_t s = 0; s < c->length + 2 * w; s++)
         scratch->strip[s] = sites + (size_t)s * PLIANT_SITE_FLOATS;
     pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
-    for (int32_t s = 0; s < c->length; s++) {
-        float *turn = turns + (size_t)s * TURN_FLOATS;
-        const int32_t block =
-            lattice->block_at[((size_t)(c->z + s) * lattice->dims[1] + c->y) * lattice->row_blocks +
-                              c->x];
-        if (block < 0 && w == 1) {
-            memset(turn, 0, TURN_FLOATS * sizeof *turn);
+    match_group group;
+    for (int32_t first = 0; first < c->length; first += group.count) {
+        int32_t block_count = 0;
+        group.count =
+            c->length - first < PLIANT_POLAR_GROUP ? c->length - first : PLIANT_POLAR_GROUP;
+        for (int32_t i = 0; i < group.count; i++) {
+            const int32_t s = first + i, turn = c->first_turn + s;
+            const int32_t is_block = lattice->turn_block[turn] >= 0;
+            block_count += is_block;
+            group.constants[i] =
+                is_block ? &body->region_constants[body->region_constants_of[turn]] : NULL;
+            if (!is_block && w == 1) continue;
+            pliant_f8 sum[9], moment[3];
+            pliant_window_next(&window, s, 3, 6, sum, moment);
+            for (int f = 0; f < 9; f++) pliant_f8_store(group.sums[i] + 8 * f, sum[f]);
+            for (int f = 0; f < 3; f++) pliant_f8_store(group.sums[i] + 8 * (9 + f), moment[f]);
+            apply_repair(scratch, s, group.sums[i]);
+        }
+        if (block_count == 0) {
+            memset(turns + (size_t)first * TURN_FLOATS, 0,
+                   (size_t)group.count * TURN_FLOATS * sizeof *turns);
             continue;
         }
-        pliant_f8 sum[9], moment[3];
-        pliant_window_next(&window, s, 3, 6, sum, moment);
-        if (block < 0) {
-            memset(turn, 0, TURN_FLOATS * sizeof *turn);
-            continue;
-        }
-        float sums[12 * PLIANT_LANES];
-        for (int f = 0; f < 9; f++) pliant_f8_store(sums + 8 * f, sum[f]);
-        for (int f = 0; f < 3; f++) pliant_f8_store(sums + 8 * (9 + f), moment[f]);
-        apply_repair(scratch, s, sums);
-        match_block(body, block, sums, turn);
+        match_group_of(&group, lattice->cell_size,
+                       body->quaternion + (size_t)(c->first_turn + first) * 4 * PLIANT_LANES,
+                       turns + (size_t)first * TURN_FLOATS);
     }
 }
 

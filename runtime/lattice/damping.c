@@ -143,7 +143,7 @@ static void blend_slab(pliant_body *body, int32_t z, const rigid_motion *m, floa
     const pliant_lattice *lattice = body->lattice;
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
         const pliant_f8 is_particle =
-            pliant_f8_load(body->constants[body->constants_of[b]].is_particle);
+            pliant_f8_load(body->particle_constants[body->particle_constants_of[b]].is_particle);
         const float *xs = body->x + (size_t)b * 3 * PLIANT_LANES;
         float *vs = body->v + (size_t)b * 3 * PLIANT_LANES;
         pliant_f8 x[3];
@@ -166,7 +166,8 @@ static void blend_slab(pliant_body *body, int32_t z, const rigid_motion *m, floa
 // The fit's fields of a block's particles, before they are weighed.
 PLIANT_INLINE void fields_of(const pliant_body *body, int32_t block, pliant_f8 *fields)
 {
-    const pliant_f8 share = pliant_f8_load(body->constants[body->constants_of[block]].share);
+    const pliant_f8 share =
+        pliant_f8_load(body->particle_constants[body->particle_constants_of[block]].share);
     const float *xs = body->x + (size_t)block * 3 * PLIANT_LANES;
     const float *vs = body->v + (size_t)block * 3 * PLIANT_LANES;
     pliant_f8 x[3], v[3], mx[3];
@@ -240,7 +241,8 @@ PLIANT_INLINE void gather_plates(const pliant_body *body, int32_t z, pliant_scra
 static void fields_of_one(const pliant_body *body, int32_t slot, float *values)
 {
     const int32_t block = slot / (3 * PLIANT_LANES);
-    const float share = body->constants[body->constants_of[block]].share[slot % PLIANT_LANES];
+    const float share =
+        body->particle_constants[body->particle_constants_of[block]].share[slot % PLIANT_LANES];
     float x[3], v[3];
     for (int c = 0; c < 3; c++) {
         x[c] = body->x[slot + PLIANT_LANES * c] - body->origin[c];
@@ -320,13 +322,13 @@ typedef struct repair {
     float more[FIT_COUNT][PLIANT_LANES];
 } repair;
 
-static repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
+PLIANT_INLINE repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
 {
     repair *all = (repair *)(void *)scratch->fit_repairs;
     if (scratch->repair_of[s] >= 0) return &all[scratch->repair_of[s]];
     repair *r = &all[scratch->repair_of[s] = (*count)++];
-    memset(r->more, 0, sizeof r->more);
-    for (int k = 0; k < PLIANT_LANES; k++) r->keep[k] = 1;
+    pliant_f8_store(r->keep, pliant_f8_all(1.0f));
+    for (int f = 0; f < FIT_COUNT; f++) pliant_f8_store(r->more[f], (pliant_f8){0});
     return r;
 }
 
@@ -377,10 +379,9 @@ PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_
 //     L = sum m~ x cross v - M c cross v_r,  I = sum m~ [x]^T[x] - M [c]^T[c],  omega = I^-1 L
 // What rounding may have made of I is bounded by raising its diagonal: by 1e-5 of its trace, and by
 // what the cancelled squares leave.
-PLIANT_INLINE void fit_block(const pliant_body *body, int32_t block, const pliant_f8 *sums,
+PLIANT_INLINE void fit_block(const pliant_region_constants *constants, const pliant_f8 *sums,
                              float *turn)
 {
-    const pliant_block_constants *constants = &body->constants[body->constants_of[block]];
     const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
     const pliant_f8 inverse_mass = pliant_f8_load(constants->inverse_mass);
     pliant_f8 v[3], centre[3], spin[3], square[3], product[3];
@@ -432,9 +433,7 @@ PLIANT_INLINE void fit_regions(pliant_body *body, int32_t column, pliant_scratch
     pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
     for (int32_t s = 0; s < c->length; s++) {
         float *turn = scratch->turns + (size_t)s * TURN_FLOATS;
-        const int32_t block =
-            lattice->block_at[((size_t)(c->z + s) * lattice->dims[1] + c->y) * lattice->row_blocks +
-                              c->x];
+        const int32_t block = lattice->turn_block[c->first_turn + s];
         pliant_f8 sums[FIT_COUNT], none[1];
         if (block >= 0 || w > 1) pliant_window_next(&window, s, 0, FIT_COUNT, sums, none);
         if (block < 0) {
@@ -448,7 +447,8 @@ PLIANT_INLINE void fit_regions(pliant_body *body, int32_t column, pliant_scratch
             for (int f = 0; f < FIT_COUNT; f++)
                 sums[f] = keep * sums[f] + pliant_f8_load(r->more[f]);
         }
-        fit_block(body, block, sums, turn);
+        fit_block(&body->region_constants[body->region_constants_of[c->first_turn + s]], sums,
+                  turn);
     }
 }
 
@@ -647,7 +647,8 @@ PLIANT_INLINE void blend(pliant_body *body, int32_t z, float k, pliant_scratch *
     const size_t length = pliant_row_length(lattice->row_blocks);
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
         const int32_t *place = lattice->block_place + 3 * (size_t)b;
-        const pliant_block_constants *constants = &body->constants[body->constants_of[b]];
+        const pliant_particle_constants *constants =
+            &body->particle_constants[body->particle_constants_of[b]];
         const pliant_f8 inverse = pliant_f8_load(constants->inverse_size);
         const pliant_f8 part = pliant_f8_all(k) * pliant_f8_load(constants->is_particle);
         const float *mean =

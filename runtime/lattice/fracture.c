@@ -17,8 +17,10 @@ static void lay_out(pliant_arena *arena, const pliant_lattice *lattice, int32_t 
                     pliant_fracture *fracture)
 {
     const size_t count = (size_t)lattice->particle_count;
-    PLIANT_TAKE(arena, fracture->constants_of, lattice->block_count);
-    PLIANT_TAKE(arena, fracture->constants, lattice->block_count);
+    PLIANT_TAKE(arena, fracture->particle_constants_of, lattice->block_count);
+    PLIANT_TAKE(arena, fracture->region_constants_of, lattice->turn_count);
+    PLIANT_TAKE(arena, fracture->particle_constants, lattice->block_count);
+    PLIANT_TAKE(arena, fracture->region_constants, lattice->turn_count);
     pliant_irregular_lay_out(&fracture->irregular, arena);
     PLIANT_TAKE(arena, fracture->is_listed, lattice->exceptions.count);
     PLIANT_TAKE(arena, fracture->size, count);
@@ -71,7 +73,8 @@ pliant_status pliant_fracture_create(const pliant_lattice *lattice, int32_t work
     status = pliant_arena_reserve(&fracture->arena, err);
     if (status < 0) goto done;
     lay_out(&fracture->arena, lattice, worker_count, fracture);
-    for (int32_t b = 0; b < lattice->block_count; b++) fracture->constants_of[b] = b;
+    for (int32_t b = 0; b < lattice->block_count; b++) fracture->particle_constants_of[b] = b;
+    for (int32_t t = 0; t < lattice->turn_count; t++) fracture->region_constants_of[t] = t;
     pliant_fracture_mend(fracture, lattice);
 done:
     if (status < 0) {
@@ -94,7 +97,10 @@ void pliant_fracture_mend(pliant_fracture *fracture, const pliant_lattice *latti
 {
     pliant_links_restore(fracture->links, lattice->links);
     for (int32_t b = 0; b < lattice->block_count; b++)
-        fracture->constants[b] = lattice->constants[lattice->constants_of[b]];
+        fracture->particle_constants[b] =
+            lattice->particle_constants[lattice->particle_constants_of[b]];
+    for (int32_t t = 0; t < lattice->turn_count; t++)
+        fracture->region_constants[t] = lattice->region_constants[lattice->region_constants_of[t]];
     take_apart(lattice, fracture);
     fracture->cut_count = 0;
 }
@@ -103,7 +109,10 @@ void pliant_fracture_copy(pliant_fracture *to, const pliant_fracture *from,
                           const pliant_lattice *lattice)
 {
     pliant_links_restore(to->links, from->links);
-    memcpy(to->constants, from->constants, (size_t)lattice->block_count * sizeof *to->constants);
+    memcpy(to->particle_constants, from->particle_constants,
+           (size_t)lattice->block_count * sizeof *to->particle_constants);
+    memcpy(to->region_constants, from->region_constants,
+           (size_t)lattice->turn_count * sizeof *to->region_constants);
     memcpy(to->size, from->size, (size_t)lattice->particle_count * sizeof *to->size);
     pliant_irregular_copy(&to->irregular, &from->irregular);
     to->cut_count = from->cut_count;
@@ -246,7 +255,7 @@ static void find_region(pliant_fracture *fracture, const pliant_lattice *lattice
     fracture->state[particle] |= IS_CHANGED;
     pliant_irregular_remove(&fracture->irregular, &place);
     (void)pliant_irregular_add(&fracture->irregular, &place, fracture->reach, PLIANT_REGION_APART);
-    pliant_block_constants *constants = &fracture->constants[place.block];
+    pliant_particle_constants *constants = &fracture->particle_constants[place.block];
     const float mass = lattice->lane_mass[place.block * PLIANT_LANES + place.lane];
     constants->share[place.lane] = mass / (float)fracture->reach->size;
     constants->inverse_size[place.lane] = 1 / (float)fracture->reach->size;
@@ -268,13 +277,14 @@ static void weigh_region(pliant_fracture *fracture, const pliant_lattice *lattic
                                        w) *
                                           lattice->row_blocks +
                                       x / PLIANT_LANES];
-                const double share = (double)fracture->constants[block].share[x % PLIANT_LANES];
+                const double share =
+                    (double)fracture->particle_constants[block].share[x % PLIANT_LANES];
                 mass += share;
                 offset[0] += share * dx;
                 offset[1] += share * (y - w);
                 offset[2] += share * (z - w);
             }
-    pliant_block_constants *constants = &fracture->constants[place.block];
+    pliant_region_constants *constants = &fracture->region_constants[place.turn];
     constants->inverse_mass[place.lane] = (float)(1 / mass);
     for (int c = 0; c < 3; c++) constants->offset[c][place.lane] = (float)(offset[c] / mass);
 }

@@ -10,9 +10,11 @@
 #include "lattice/lattice.h"
 
 typedef struct pliant_fracture {
-    pliant_links *links;                // owned: what still holds
-    int32_t *constants_of;              // shape [block_count]: every block its own
-    pliant_block_constants *constants;  // shape [block_count]
+    pliant_links *links;  // owned: what still holds
+    // Every block its own:
+    int32_t *particle_constants_of, *region_constants_of;  // shape [block_count], [turn_count]
+    pliant_particle_constants *particle_constants;
+    pliant_region_constants *region_constants;
     pliant_irregular irregular;
     uint8_t *is_listed;    // shape [exceptions]: all 0
     int32_t *size;         // shape [particle_count], |R_i|

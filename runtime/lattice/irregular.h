@@ -65,9 +65,9 @@ typedef enum pliant_region_rule {
     PLIANT_REGION_APART,  // never minus: pieces that fly apart must not see each other's rounding
 } pliant_region_rule;
 
-// Where a region is: its particle, column and slab, and its place among the lanes.
+// Where a region is: its particle, column and turn (see lattice.h), its place among the lanes.
 typedef struct pliant_region_place {
-    int32_t particle, column, block, lane;
+    int32_t particle, column, turn, block, lane;
     int32_t x, y, z;
 } pliant_region_place;
 

@@ -27,7 +27,7 @@ static void lay_out(pliant_arena *arena, pliant_lattice *lattice)
     PLIANT_TAKE(arena, lattice->columns, (size_t)dims[1] * lattice->row_blocks);
     PLIANT_TAKE(arena, lattice->lane_mass, (size_t)lattice->block_count * PLIANT_LANES);
     PLIANT_TAKE(arena, lattice->lane_inverse, (size_t)lattice->block_count * PLIANT_LANES);
-    PLIANT_TAKE(arena, lattice->constants_of, lattice->block_count);
+    PLIANT_TAKE(arena, lattice->particle_constants_of, lattice->block_count);
 }
 
 static int32_t count_blocks(const pliant_lattice_shape *shape)
@@ -95,8 +95,30 @@ static void place_columns(pliant_lattice *lattice)
     }
     for (int32_t c = 0; c < lattice->column_count; c++) {
         lattice->columns[c].first_site = lattice->site_count;
+        lattice->columns[c].first_turn = lattice->turn_count;
         lattice->site_count += lattice->columns[c].length + 2 * lattice->half_width;
+        lattice->turn_count += lattice->columns[c].length;
     }
+}
+
+// What belongs to regions is kept column by column, as the sums along z come by.
+static pliant_status place_turns(pliant_lattice *lattice, pliant_error *err)
+{
+    PLIANT_TAKE(&lattice->turn_arena, lattice->turn_block, lattice->turn_count);
+    PLIANT_TAKE(&lattice->turn_arena, lattice->region_constants_of, lattice->turn_count);
+    const pliant_status status = pliant_arena_reserve(&lattice->turn_arena, err);
+    if (status < 0) return status;
+    PLIANT_TAKE(&lattice->turn_arena, lattice->turn_block, lattice->turn_count);
+    PLIANT_TAKE(&lattice->turn_arena, lattice->region_constants_of, lattice->turn_count);
+    for (int32_t c = 0; c < lattice->column_count; c++) {
+        const pliant_lattice_column *column = &lattice->columns[c];
+        for (int32_t s = 0; s < column->length; s++)
+            lattice->turn_block[column->first_turn + s] =
+                lattice->block_at[((size_t)(column->z + s) * lattice->dims[1] + column->y) *
+                                      lattice->row_blocks +
+                                  column->x];
+    }
+    return PLIANT_OK;
 }
 
 // ---- Members, from the nodes that a file stores or regions.c has made ----
@@ -159,55 +181,75 @@ static region_moments moments_of(const pliant_lattice *lattice, const pliant_rea
 
 // ---- Constants ----
 
-static void set_constants(pliant_block_constants *constants, int32_t lane, double share,
-                          int32_t size, const region_moments *moments)
+static void set_constants(pliant_particle_constants *particle, pliant_region_constants *region,
+                          int32_t lane, double share, int32_t size, const region_moments *moments)
 {
     // Symmetric regions have their centre in their middle; what rounding leaves there is dust that
     // would make equal blocks differ.
     const double dust = 1e-9;
-    constants->share[lane] = (float)share;
-    constants->inverse_size[lane] = (float)(1.0 / size);
-    constants->inverse_mass[lane] = (float)(1 / moments->mass);
+    particle->share[lane] = (float)share;
+    particle->inverse_size[lane] = (float)(1.0 / size);
+    particle->is_particle[lane] = region->is_particle[lane] = 1;
+    region->inverse_mass[lane] = (float)(1 / moments->mass);
     for (int c = 0; c < 3; c++)
-        constants->offset[c][lane] =
-            fabs(moments->offset[c]) < dust ? 0 : (float)moments->offset[c];
-    constants->is_particle[lane] = 1;
+        region->offset[c][lane] = fabs(moments->offset[c]) < dust ? 0 : (float)moments->offset[c];
 }
 
-static uint64_t hash_constants(const pliant_block_constants *constants)
+static uint64_t hash_bytes(const void *bytes, size_t size)
 {
-    const uint32_t *words = (const uint32_t *)(const void *)constants;
-    uint64_t h = 14695981039346656037u;  // FNV-1a over words
-    for (size_t k = 0; k < sizeof *constants / sizeof *words; k++)
-        h = (h ^ words[k]) * 1099511628211u;
+    uint64_t h = 14695981039346656037u;  // FNV-1a, a word at a time
+    for (size_t k = 0; k < size; k += sizeof(uint32_t)) {
+        uint32_t word;
+        memcpy(&word, (const char *)bytes + k, sizeof word);
+        h = (h ^ word) * 1099511628211u;
+    }
     return h ^ h >> 29;
 }
 
-// Store equal constants once; `all` (one a block) is overwritten by the distinct ones.
-static pliant_status share_constants(pliant_lattice *lattice, pliant_block_constants *all)
+// Move the distinct ones of `count` items of `size` bytes to the front, in the order of their first
+// appearance; of[i] says which item i is. Returns how many; -1: no memory.
+static int32_t keep_distinct(void *items, size_t size, int32_t count, int32_t *of)
 {
-    uint32_t size = 64;
-    while (size < 2 * (uint32_t)lattice->block_count) size *= 2;
-    int32_t *table = malloc(size * sizeof *table);
-    if (!table) return PLIANT_ERR_MEMORY;
-    memset(table, -1, size * sizeof *table);
-    int32_t count = 0;
-    for (int32_t b = 0; b < lattice->block_count; b++) {
-        uint32_t at = (uint32_t)hash_constants(&all[b]) & (size - 1);
-        while (table[at] >= 0 && memcmp(&all[table[at]], &all[b], sizeof *all) != 0)
-            at = (at + 1) & (size - 1);
+    uint32_t slots = 64;
+    while (slots < 2 * (uint32_t)count) slots *= 2;
+    int32_t *table = malloc(slots * sizeof *table);
+    if (!table) return -1;
+    memset(table, -1, slots * sizeof *table);
+    char *all = items;
+    int32_t kept = 0;
+    for (int32_t i = 0; i < count; i++) {
+        uint32_t at = (uint32_t)hash_bytes(all + i * size, size) & (slots - 1);
+        while (table[at] >= 0 && memcmp(all + table[at] * size, all + i * size, size) != 0)
+            at = (at + 1) & (slots - 1);
         if (table[at] < 0) {
-            all[count] = all[b];
-            table[at] = count++;
+            memmove(all + kept * size, all + i * size, size);
+            table[at] = kept++;
         }
-        lattice->constants_of[b] = table[at];
+        of[i] = table[at];
     }
     free(table);
-    lattice->constants_count = count;
-    PLIANT_TAKE(&lattice->constants_arena, lattice->constants, count);
-    if (pliant_arena_reserve(&lattice->constants_arena, NULL) < 0) return PLIANT_ERR_MEMORY;
-    PLIANT_TAKE(&lattice->constants_arena, lattice->constants, count);
-    memcpy(lattice->constants, all, (size_t)count * sizeof *all);
+    return kept;
+}
+
+static pliant_status share_constants(pliant_lattice *lattice, pliant_particle_constants *particles,
+                                     pliant_region_constants *regions)
+{
+    const int32_t particle_count = keep_distinct(particles, sizeof *particles, lattice->block_count,
+                                                 lattice->particle_constants_of);
+    const int32_t region_count =
+        keep_distinct(regions, sizeof *regions, lattice->turn_count, lattice->region_constants_of);
+    if (particle_count < 0 || region_count < 0) return PLIANT_ERR_MEMORY;
+    lattice->particle_constants_count = particle_count;
+    lattice->region_constants_count = region_count;
+    PLIANT_TAKE(&lattice->particle_arena, lattice->particle_constants, particle_count);
+    PLIANT_TAKE(&lattice->region_arena, lattice->region_constants, region_count);
+    if (pliant_arena_reserve(&lattice->particle_arena, NULL) < 0 ||
+        pliant_arena_reserve(&lattice->region_arena, NULL) < 0)
+        return PLIANT_ERR_MEMORY;
+    PLIANT_TAKE(&lattice->particle_arena, lattice->particle_constants, particle_count);
+    PLIANT_TAKE(&lattice->region_arena, lattice->region_constants, region_count);
+    memcpy(lattice->particle_constants, particles, (size_t)particle_count * sizeof *particles);
+    memcpy(lattice->region_constants, regions, (size_t)region_count * sizeof *regions);
     return PLIANT_OK;
 }
 
@@ -250,8 +292,9 @@ static void index_exceptions(pliant_lattice *lattice, const pliant_regions *regi
 typedef struct region_work {
     const pliant_regions *regions;
     prefix_sums sums;
-    pliant_block_constants *constants;  // shape [block_count]
-    int32_t *exception_of;              // shape [particle_count]: index, or -1
+    pliant_particle_constants *particle_constants;  // shape [block_count]
+    pliant_region_constants *region_constants;      // shape [turn_count]
+    int32_t *exception_of;                          // shape [particle_count]: index, or -1
     pliant_reach reach;
 } region_work;
 
@@ -324,8 +367,9 @@ static pliant_status add_regions(pliant_lattice *lattice, region_work *work)
         const pliant_region_place place = pliant_lattice_place(lattice, i);
         find_members(lattice, regions, i, is_irregular ? node : NULL, &work->reach);
         const region_moments moments = moments_of(lattice, &work->reach, i, &work->sums);
-        set_constants(&work->constants[place.block], place.lane,
-                      work->sums.share[i + 1] - work->sums.share[i], regions->size[i], &moments);
+        set_constants(&work->particle_constants[place.block], &work->region_constants[place.turn],
+                      place.lane, work->sums.share[i + 1] - work->sums.share[i], regions->size[i],
+                      &moments);
         work->exception_of[i] = is_irregular ? next : -1;
         if (!is_irregular) continue;
         const int32_t k = next++;
@@ -374,10 +418,13 @@ static pliant_status make_regions(pliant_lattice *lattice, const pliant_lattice_
     work->regions = def->regions;
     work->sums.share = calloc((size_t)count + 1, sizeof *work->sums.share);
     work->sums.moment = calloc((size_t)count + 1, sizeof *work->sums.moment);
-    work->constants = calloc((size_t)lattice->block_count, sizeof *work->constants);
+    work->particle_constants =
+        calloc((size_t)lattice->block_count, sizeof *work->particle_constants);
+    work->region_constants = calloc((size_t)lattice->turn_count, sizeof *work->region_constants);
     work->exception_of = malloc((size_t)count * sizeof *work->exception_of);
     status = PLIANT_ERR_MEMORY;
-    if (work->sums.share && work->sums.moment && work->constants && work->exception_of) {
+    if (work->sums.share && work->sums.moment && work->particle_constants &&
+        work->region_constants && work->exception_of) {
         for (int32_t i = 0; i < count; i++) {
             const double share = (double)def->mass[i] / def->regions->size[i];
             work->sums.share[i + 1] = work->sums.share[i] + share;
@@ -386,7 +433,8 @@ static pliant_status make_regions(pliant_lattice *lattice, const pliant_lattice_
         }
         status = add_regions(lattice, work);
         if (status >= 0) status = list_exceptions(lattice, work);
-        if (status >= 0) status = share_constants(lattice, work->constants);
+        if (status >= 0)
+            status = share_constants(lattice, work->particle_constants, work->region_constants);
     }
     for (int32_t c = 0; c < lattice->column_count; c++) {
         int32_t most = 0;
@@ -397,7 +445,8 @@ static pliant_status make_regions(pliant_lattice *lattice, const pliant_lattice_
     }
     free(work->sums.share);
     free(work->sums.moment);
-    free(work->constants);
+    free(work->particle_constants);
+    free(work->region_constants);
     free(work->exception_of);
     free(work);
     return status;
@@ -435,6 +484,8 @@ pliant_status pliant_lattice_build(const pliant_lattice_def *def, pliant_lattice
     place_blocks(lattice, def);
     place_slabs(lattice);
     place_columns(lattice);
+    status = place_turns(lattice, err);
+    if (status < 0) goto done;
     status = make_regions(lattice, def);
     if (status == PLIANT_ERR_FORMAT)
         (void)pliant_error_set(err, status,
@@ -456,7 +507,9 @@ void pliant_lattice_destroy(pliant_lattice *lattice)
 {
     if (!lattice) return;
     pliant_arena_release(&lattice->arena);
-    pliant_arena_release(&lattice->constants_arena);
+    pliant_arena_release(&lattice->turn_arena);
+    pliant_arena_release(&lattice->particle_arena);
+    pliant_arena_release(&lattice->region_arena);
     pliant_arena_release(&lattice->exceptions_arena);
     pliant_arena_release(&lattice->items_arena);
     pliant_arena_release(&lattice->irregular_arena);

@@ -22,7 +22,8 @@ PLIANT_INLINE void load_row(const pliant_body *body, int32_t y, int32_t z, float
             for (int c = 0; c < 3; c++) pliant_f8_store(to + c * length, (pliant_f8){0});
             continue;
         }
-        const pliant_f8 share = pliant_f8_load(body->constants[body->constants_of[block]].share);
+        const pliant_f8 share =
+            pliant_f8_load(body->particle_constants[body->particle_constants_of[block]].share);
         const float *x = body->x + (size_t)block * 3 * PLIANT_LANES;
         for (int c = 0; c < 3; c++)
             pliant_f8_store(to + c * length,
@@ -102,7 +103,7 @@ static void weigh(const pliant_body *body, int32_t x, int32_t y, int32_t z, floa
     const int32_t block =
         lattice
             ->block_at[((size_t)z * lattice->dims[1] + y) * lattice->row_blocks + x / PLIANT_LANES];
-    const float share = body->constants[body->constants_of[block]].share[lane];
+    const float share = body->particle_constants[body->particle_constants_of[block]].share[lane];
     const float *at = body->x + (size_t)block * 3 * PLIANT_LANES + lane;
     for (int c = 0; c < 3; c++) value[c] = share * (at[8 * c] - body->origin[c]);
 }
@@ -149,7 +150,8 @@ static void weigh_listed(pliant_body *body, int32_t z)
     for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
         const int32_t slot = body->lattice->slot[e->particle[k]];
         const int32_t block = slot / (3 * PLIANT_LANES);
-        const float share = body->constants[body->constants_of[block]].share[slot % PLIANT_LANES];
+        const float share =
+            body->particle_constants[body->particle_constants_of[block]].share[slot % PLIANT_LANES];
         float *to = body->weighed + 4 * (size_t)k;
         for (int c = 0; c < 3; c++)
             to[c] = share * (body->x[slot + PLIANT_LANES * c] - body->origin[c]);
@@ -304,7 +306,8 @@ PLIANT_INLINE void accelerate(pliant_body *body, int32_t z, float h, pliant_scra
     const float gravity[3] = {body->gravity.x, body->gravity.y, body->gravity.z};
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
         const int32_t *place = lattice->block_place + 3 * (size_t)b;
-        const pliant_block_constants *constants = &body->constants[body->constants_of[b]];
+        const pliant_particle_constants *constants =
+            &body->particle_constants[body->particle_constants_of[b]];
         const pliant_f8 inverse = pliant_f8_load(constants->inverse_size);
         const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
         const float *goal = bar_rows(lattice, scratch, place[1], z) + PLIANT_ROW_PAD + 8 * place[0];
