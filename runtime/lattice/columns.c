@@ -87,10 +87,10 @@ PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_
     int32_t count = 0;
     for (int32_t s = 0; s < c->length; s++) scratch->repair_of[s] = -1;
     for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
-        const int32_t k = e->column_items[i];
+        const pliant_exception_place *place = &e->column_items[i];
+        const int32_t k = place->k;
         if (!body->is_listed[k]) continue;
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        repair_listed(body, k, repair_at(scratch, at[2] - c->z, &count), at[0] % PLIANT_LANES);
+        repair_listed(body, k, repair_at(scratch, place->s, &count), place->lane);
     }
     for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
         const pliant_region_node *node = &irregular->regions[n];
@@ -235,10 +235,9 @@ static void list_turns(pliant_body *body, int32_t column, const float *turns)
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
     for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
-        const int32_t k = e->column_items[i];
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        const float *turn = turns + (size_t)(at[2] - lattice->columns[column].z) * TURN_FLOATS +
-                            at[0] % PLIANT_LANES;
+        const pliant_exception_place *place = &e->column_items[i];
+        const int32_t k = place->k;
+        const float *turn = turns + (size_t)place->s * TURN_FLOATS + place->lane;
         float *to = body->listed_turns + 16 * (size_t)k;
         for (int c = 0; c < 3; c++) {
             to[c] = body->is_listed[k] ? turn[8 * (TURN_P + c)] : 0;

@@ -342,18 +342,18 @@ PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_
     int32_t count = 0;
     for (int32_t s = 0; s < c->length; s++) scratch->repair_of[s] = -1;
     for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
-        const int32_t k = e->column_items[i];
+        const pliant_exception_place *place = &e->column_items[i];
+        const int32_t k = place->k;
         if (!body->is_listed[k]) continue;
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
         pliant_f8 low = {0}, high = {0};
         for (int32_t j = e->first[k]; j < e->first[k + 1]; j++) {
             const float *values = body->listed_fits + 16 * (size_t)e->items[j].other;
             low += pliant_f8_load(values);
             high += pliant_f8_load(values + 8);
         }
-        repair *r = repair_at(scratch, at[2] - c->z, &count);
+        repair *r = repair_at(scratch, place->s, &count);
         for (int f = 0; f < FIT_COUNT; f++)
-            r->more[f][at[0] % PLIANT_LANES] = f < 8 ? -low[f] : -high[f - 8];
+            r->more[f][place->lane] = f < 8 ? -low[f] : -high[f - 8];
     }
     for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
         const pliant_region_node *node = &irregular->regions[n];
@@ -459,10 +459,9 @@ static void list_turns(pliant_body *body, int32_t column, const float *turns)
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
     for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
-        const int32_t k = e->column_items[i];
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        const float *turn = turns + (size_t)(at[2] - lattice->columns[column].z) * TURN_FLOATS +
-                            at[0] % PLIANT_LANES;
+        const pliant_exception_place *place = &e->column_items[i];
+        const int32_t k = place->k;
+        const float *turn = turns + (size_t)place->s * TURN_FLOATS + place->lane;
         float *to = body->listed_turns + 16 * (size_t)k;
         for (int f = 0; f < TURN_COUNT; f++) to[f] = body->is_listed[k] ? turn[8 * f] : 0;
     }

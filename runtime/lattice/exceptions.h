@@ -11,20 +11,27 @@
 #include "pliant/arena.h"
 #include "pliant/regions.h"
 
-#define PLIANT_EXCEPTION_LIMIT 64  // of one region; see bench_lattice
+#define PLIANT_EXCEPTION_LIMIT 256  // of one region; see bench_lattice
 
 typedef struct pliant_exception {
     int32_t other;   // index of the particle that is lacked, and whose region lacks this one
     int8_t step[4];  // its place less this one's; the last is 0
 } pliant_exception;
 
+// Where a particle with an irregular region is in its column.
+typedef struct pliant_exception_place {
+    int32_t k;  // its index
+    int32_t s;  // above the column's lowest block
+    int32_t lane;
+} pliant_exception_place;
+
 typedef struct pliant_exceptions {
-    int32_t count;          // particles with irregular regions, ascending
-    int32_t *particle;      // shape [count]
-    int32_t *slab_first;    // shape [slabs + 1]: the first of each slab
-    int32_t *column_first;  // shape [columns + 1] into `column_items`
-    int32_t *column_items;  // shape [count]: those of each column, ascending
-    int32_t *first;         // shape [count + 1] into `items`
+    int32_t count;                         // particles with irregular regions, ascending
+    int32_t *particle;                     // shape [count]
+    int32_t *slab_first;                   // shape [slabs + 1]: the first of each slab
+    int32_t *column_first;                 // shape [columns + 1] into `column_items`
+    pliant_exception_place *column_items;  // shape [count]: those of each column, ascending
+    int32_t *first;                        // shape [count + 1] into `items`
     pliant_exception *items;
     uint8_t *is_listed;  // shape [count]: 1: the region's sums are mended by its list
 } pliant_exceptions;

@@ -281,8 +281,9 @@ static void index_exceptions(pliant_lattice *lattice, const pliant_regions *regi
         e->column_first[c + 1] += e->column_first[c];
     // Filled from the back, so that the offsets end where they began.
     for (int32_t k = e->count; k-- > 0;) {
-        const int32_t column = pliant_lattice_place(lattice, e->particle[k]).column;
-        e->column_items[--e->column_first[column + 1]] = k;
+        const pliant_region_place place = pliant_lattice_place(lattice, e->particle[k]);
+        e->column_items[--e->column_first[place.column + 1]] =
+            (pliant_exception_place){k, place.z - lattice->columns[place.column].z, place.lane};
     }
     for (int32_t c = 0; c < lattice->column_count; c++) e->column_first[c] = e->column_first[c + 1];
     e->column_first[lattice->column_count] = e->count;
