@@ -42,15 +42,27 @@ static PLIANT_VECTOR_CLONES int32_t try_block(const float *a, float *q, float *r
     return pliant_polar_try(1, a, q, rotation, missed);
 }
 
+// What is no unit quaternion becomes no rotation.
+static void replace_unsound(float *q)
+{
+    for (int k = 0; k < 8; k++) {
+        float length = 0;
+        for (int i = 0; i < 4; i++) length += q[8 * i + k] * q[8 * i + k];
+        if (fabsf(length - 1) < PLIANT_POLAR_UNIT) continue;
+        for (int i = 0; i < 4; i++) q[8 * i + k] = i == 3;
+    }
+}
+
 // q, shape [4][8], moves towards the maximum, however far that is.
 static PLIANT_VECTOR_CLONES void come_near(const float *a, float *q)
 {
-    pliant_polar_lanes m[9], r[9], to[4], turn[4], twice, inverse, n = {0}, square = {0};
+    pliant_polar_lanes m[9], r[9], to[4], turn[4], inverse, n = {0}, square = {0};
+    const pliant_polar_lanes two = n + 2;
     pliant_polar_masks kept;
     pliant_polar_frame f;
     pliant_polar_scale(a, m, &kept);
-    pliant_polar_start(q, to, &twice);
-    pliant_polar_matrix(to, &twice, r);
+    for (int i = 0; i < 4; i++) to[i] = *(const pliant_polar_memory *)(q + 8 * i);
+    pliant_polar_matrix(to, &two, r);
     pliant_polar_look(r, m, &f);
 
     // (lambda^2 - |A|^2)^2 - 8 lambda det A - 4 |adj A|^2 = 0; sqrt(3) |A| >= lambda.
@@ -173,9 +185,11 @@ void pliant_polar_finish(const float *a, const int32_t missed[8], float *q, floa
     int32_t left[8], left_count = 0, again[8];
     float near[4 * 8], found[4 * 8], turned[9 * 8];
     for (int k = 0; k < 8; k++) left_count += left[k] = missed[k] != 0;
+    replace_unsound(q);
     memcpy(near, q, sizeof near);
     for (int tries = 0; left_count > 0 && tries < FAR_TRIES; tries++) {
         come_near(a, near);
+        replace_unsound(near);
         memcpy(found, near, sizeof found);
         try_block(a, found, turned, again);
         for (int k = 0; k < 8; k++) {

@@ -35,7 +35,7 @@ typedef float pliant_polar_memory __attribute__((vector_size(32), aligned(4), ma
 // Blocks that one call of pliant_polar_try may take, phase by phase: a block is one long chain of
 // operations, so that a core has the time for another in between (bench_polar: 25%).
 #define PLIANT_POLAR_GROUP 3
-// A start further from |q|^2 = 1 than this is none; nearer, one Newton step makes it a unit.
+// A start further from |q|^2 = 1 than this is none.
 #define PLIANT_POLAR_UNIT 1e-3f
 
 // mask ? yes : *no, into *no.
@@ -138,28 +138,11 @@ PLIANT_POLAR_INLINE void pliant_polar_scale(const float *a, pliant_polar_lanes m
     for (int i = 0; i < 9; i++) m[i] *= scale;
 }
 
-// A nearly unit quaternion from memory and 2 / |q|^2; what is none counts as no rotation.
-PLIANT_POLAR_INLINE void pliant_polar_start(const float *q, pliant_polar_lanes start[4],
-                                            pliant_polar_lanes *twice)
-{
-    for (int i = 0; i < 4; i++) start[i] = *(const pliant_polar_memory *)(q + 8 * i);
-    pliant_polar_lanes length;
-    pliant_polar_square(start, &length);
-    const pliant_polar_lanes excess = length - 1;
-    const pliant_polar_masks sound = (excess < PLIANT_POLAR_UNIT) & (excess > -PLIANT_POLAR_UNIT);
-    for (int i = 0; i < 3; i++)
-        start[i] = (pliant_polar_lanes)((pliant_polar_masks)start[i] & sound);
-    const pliant_polar_lanes one = (pliant_polar_lanes){0} + 1;
-    const pliant_polar_masks unsound = ~sound;
-    pliant_polar_put(&unsound, &one, &start[3]);
-    *twice = 2 - 2 * (pliant_polar_lanes)((pliant_polar_masks)excess & sound);
-}
-
 // What a block carries from phase to phase of pliant_polar_try.
 typedef struct pliant_polar_work {
     pliant_polar_lanes m[9];            // A, scaled
     pliant_polar_lanes q[4], to[4];     // the start, and where it leads, of any length
-    pliant_polar_lanes r[9], twice;     // the matrix of one of them, and 2 / its |q|^2
+    pliant_polar_lanes r[9], twice;     // the matrix of one of them, and 2 / |to|^2
     pliant_polar_lanes turn[4], shift;  // p and 1, and lambda - tr B
     pliant_polar_masks kept;
     pliant_polar_frame f;
@@ -199,9 +182,13 @@ PLIANT_POLAR_INLINE void pliant_polar_judge(const pliant_polar_work *w, pliant_p
     const pliant_polar_lanes determinant = f->diagonal[2] * minor -
                                            f->yz * (f->diagonal[0] * f->yz + f->xy * f->xz) -
                                            f->xz * (f->diagonal[1] * f->xz + f->xy * f->yz);
-    *done = w->kept | ((residual <= PLIANT_POLAR_RESIDUAL * PLIANT_POLAR_RESIDUAL * size) &
-                       (f->diagonal[0] > 0.0f) & (minor > 0.0f) &
-                       (determinant >= PLIANT_POLAR_DEFINITE * size));
+    pliant_polar_lanes length;
+    pliant_polar_square(w->q, &length);
+    const pliant_polar_masks sound =
+        (length > 1 - PLIANT_POLAR_UNIT) & (length < 1 + PLIANT_POLAR_UNIT);
+    *done = sound & (w->kept | ((residual <= PLIANT_POLAR_RESIDUAL * PLIANT_POLAR_RESIDUAL * size) &
+                                (f->diagonal[0] > 0.0f) & (minor > 0.0f) &
+                                (determinant >= PLIANT_POLAR_DEFINITE * size)));
 }
 
 // Takes the unit quaternion on the start's side where the lane is done.
@@ -234,11 +221,13 @@ PLIANT_POLAR_INLINE int32_t pliant_polar_try(int count, const float *a, float *q
                                              int32_t *missed)
 {
     pliant_polar_work work[PLIANT_POLAR_GROUP], *const end = work + count;
-    const pliant_polar_lanes none = {0};
+    const pliant_polar_lanes none = {0}, two = none + 2;
     int32_t any = 0;
     for (int b = 0; b < count; b++) pliant_polar_scale(a + 72 * b, work[b].m, &work[b].kept);
-    for (int b = 0; b < count; b++) pliant_polar_start(q + 32 * b, work[b].q, &work[b].twice);
-    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_matrix(w->q, &w->twice, w->r);
+    for (int b = 0; b < count; b++)
+        for (int i = 0; i < 4; i++)
+            work[b].q[i] = *(const pliant_polar_memory *)(q + 32 * b + 8 * i);
+    for (pliant_polar_work *w = work; w < end; w++) pliant_polar_matrix(w->q, &two, w->r);
     for (pliant_polar_work *w = work; w < end; w++) pliant_polar_look(w->r, w->m, &w->f);
     for (pliant_polar_work *w = work; w < end; w++) pliant_polar_solve(&w->f, &none, w->turn);
     for (pliant_polar_work *w = work; w < end; w++) pliant_polar_shift(w);

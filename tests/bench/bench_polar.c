@@ -45,7 +45,8 @@ static PLIANT_VECTOR_CLONES void solve_once(regions *set)
         pliant_polar_masks kept;
         pliant_polar_frame f;
         pliant_polar_scale(set->a + 72 * b, m, &kept);
-        pliant_polar_start(set->q + 32 * b, q, &twice);
+        for (int i = 0; i < 4; i++) q[i] = LOAD(set->q + 32 * b + 8 * i);
+        twice = none + 2;
         pliant_polar_matrix(q, &twice, r);
         pliant_polar_look(r, m, &f);
         pliant_polar_solve(&f, &none, turn);
