@@ -29,6 +29,7 @@ static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice, 
     PLIANT_TAKE(arena, scratch->rows, 6 * length * most_rows);
     PLIANT_TAKE(arena, scratch->bars,
                 (size_t)lattice->row_blocks * lattice->dims[1] * 6 * PLIANT_LANES + 3 * length);
+    PLIANT_TAKE(arena, scratch->goals, (size_t)most_rows * 3 * lattice->row_blocks * PLIANT_LANES);
     PLIANT_TAKE(arena, scratch->tails, pliant_window_tails(w));
     PLIANT_TAKE(arena, scratch->doubled, 4 * length);
     PLIANT_TAKE(arena, scratch->turns, (size_t)longest * 12 * PLIANT_LANES);
@@ -53,11 +54,11 @@ static void lay_out(pliant_arena *arena, pliant_body *body)
     PLIANT_TAKE(arena, body->quaternion, 4 * (size_t)lattice->turn_count * PLIANT_LANES);
     PLIANT_TAKE(arena, body->sites, (size_t)lattice->site_count * PLIANT_SITE_FLOATS);
     PLIANT_TAKE(arena, body->plate_sums, 9 * plates);
-    PLIANT_TAKE(arena, body->weighed, 4 * (size_t)lattice->exceptions.count);
-    PLIANT_TAKE(arena, body->listed_turns, 16 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->weighed, 4 * ((size_t)lattice->exceptions.count + 1));
+    PLIANT_TAKE(arena, body->listed_turns, 16 * ((size_t)lattice->exceptions.count + 1));
     PLIANT_TAKE(arena, body->fit_sites, (size_t)lattice->site_count * 15 * PLIANT_LANES);
     PLIANT_TAKE(arena, body->fit_plates, 15 * plates);
-    PLIANT_TAKE(arena, body->listed_fits, 16 * (size_t)lattice->exceptions.count);
+    PLIANT_TAKE(arena, body->listed_fits, 16 * ((size_t)lattice->exceptions.count + 1));
     PLIANT_TAKE(arena, body->slab_sums, 16 * (size_t)lattice->dims[2]);
     PLIANT_TAKE(arena, body->scratch, body->worker_count);
     // Of regions made of parts a column of a breakable body may have one for every particle.

@@ -47,14 +47,15 @@ struct pliant_body {
     pliant_fracture *fracture;  // owned; NULL: unbreakable
 
     // Scratch of a step.
-    float *sites;         // shape [site][9][8]: sums over plates, then what comes back to them
-    float *plate_sums;    // shape [plate][9]
-    float *weighed;       // shape [exception][4]: m~ (x - origin)
-    float *listed_turns;  // shape [exception][4][4]: p, a, b, c of T_r; 0 where parts are used
+    float *sites;       // shape [site][9][8]: sums over plates, then what comes back to them
+    float *plate_sums;  // shape [plate][9]
+    float *weighed;     // shape [exceptions + 1][4]: m~ (x - origin); the last is 0
+    float *
+        listed_turns;  // shape [exceptions + 1][4][4]: p, -a, -b, -c of T_r; 0 where parts are used
     // The same of damping.
     float *fit_sites;                // shape [site][15][8]
     float *fit_plates;               // shape [plate][15]
-    float *listed_fits;              // shape [exception][16]
+    float *listed_fits;              // shape [exceptions + 1][16]
     double *slab_sums;               // shape [dims z][16]
     struct pliant_scratch *scratch;  // shape [worker]
     int32_t worker_count;
@@ -66,6 +67,7 @@ struct pliant_body {
 typedef struct pliant_scratch {
     float *rows;          // padded rows of one slab
     float *bars;          // shape [row_blocks][dims y][6][8]
+    float *goals;         // shape [most rows of a slab][3][row_blocks][8]
     float *tails;         // see window.h
     float *doubled;       // 4 padded rows
     float *turns;         // shape [longest column + 4w][12][8]: T_r of a column

@@ -36,24 +36,27 @@ PLIANT_INLINE repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *cou
     return r;
 }
 
-// Less the particles that a region lacks.
+// Less the particles that a region lacks, two at a time.
 PLIANT_INLINE void repair_listed(const pliant_body *body, int32_t k, repair *r, int32_t lane)
 {
     const pliant_exceptions *e = &body->lattice->exceptions;
-    pliant_f4 sum = {0}, x = {0}, y = {0}, z = {0};
-    for (int32_t i = e->first[k]; i < e->first[k + 1]; i++) {
-        const pliant_exception *item = &e->items[i];
-        const pliant_f4 value = pliant_f4_load(body->weighed + 4 * (size_t)item->other);
+    pliant_f8 sum = {0}, x = {0}, y = {0}, z = {0};
+    for (int32_t i = e->first[k]; i < e->first[k + 1]; i += 2) {
+        const float *one = body->weighed + 4 * (size_t)e->other[i];
+        const float *two = body->weighed + 4 * (size_t)e->other[i + 1];
+        const pliant_f8 value = __builtin_shufflevector(pliant_f4_load(one), pliant_f4_load(two), 0,
+                                                        1, 2, 3, 4, 5, 6, 7);
+        const pliant_f8 step = pliant_f8_steps(e->step[i]);
         sum += value;
-        x += value * (float)item->step[0];
-        y += value * (float)item->step[1];
-        z += value * (float)item->step[2];
+        x += value * pliant_f8_of(0, 0, 0, 0, 4, 4, 4, 4, step);
+        y += value * pliant_f8_of(1, 1, 1, 1, 5, 5, 5, 5, step);
+        z += value * pliant_f8_of(2, 2, 2, 2, 6, 6, 6, 6, step);
     }
     for (int c = 0; c < 3; c++) {
-        r->more[c][lane] = -sum[c];
-        r->more[3 + c][lane] = -x[c];
-        r->more[6 + c][lane] = -y[c];
-        r->more[9 + c][lane] = -z[c];
+        r->more[c][lane] = -(sum[c] + sum[4 + c]);
+        r->more[3 + c][lane] = -(x[c] + x[4 + c]);
+        r->more[6 + c][lane] = -(y[c] + y[4 + c]);
+        r->more[9 + c][lane] = -(z[c] + z[4 + c]);
     }
 }
 
@@ -230,7 +233,7 @@ PLIANT_INLINE void match_regions(pliant_body *body, int32_t column, float *turns
 }
 
 // T_r of listed regions, for those who leave it out.
-static void list_turns(pliant_body *body, int32_t column, const float *turns)
+PLIANT_INLINE void list_turns(pliant_body *body, int32_t column, const float *turns)
 {
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
@@ -239,11 +242,15 @@ static void list_turns(pliant_body *body, int32_t column, const float *turns)
         const int32_t k = place->k;
         const float *turn = turns + (size_t)place->s * TURN_FLOATS + place->lane;
         float *to = body->listed_turns + 16 * (size_t)k;
+        if (!body->is_listed[k]) {
+            memset(to, 0, 16 * sizeof *to);
+            continue;
+        }
         for (int c = 0; c < 3; c++) {
-            to[c] = body->is_listed[k] ? turn[8 * (TURN_P + c)] : 0;
-            to[4 + c] = body->is_listed[k] ? turn[8 * (TURN_A + c)] : 0;
-            to[8 + c] = body->is_listed[k] ? turn[8 * (TURN_B + c)] : 0;
-            to[12 + c] = body->is_listed[k] ? turn[8 * (TURN_C + c)] : 0;
+            to[c] = turn[8 * (TURN_P + c)];
+            to[4 + c] = -turn[8 * (TURN_A + c)];
+            to[8 + c] = -turn[8 * (TURN_B + c)];
+            to[12 + c] = -turn[8 * (TURN_C + c)];
         }
     }
 }

@@ -202,7 +202,7 @@ PLIANT_INLINE void gather_bars(const pliant_body *body, int32_t z, pliant_scratc
         }
         float *bars = scratch->fit_bars + (size_t)y * FIT_FLOATS;
         for (int f = 0; f < FIT_COUNT; f++)
-            pliant_window_along(scratch->fit_rows + f * length + PLIANT_ROW_PAD, blocks,
+            pliant_window_along(scratch->fit_rows + f * length + PLIANT_ROW_PAD, NULL, blocks,
                                 lattice->half_width, scratch->doubled, bars + 8 * f, NULL, apart);
     }
 }
@@ -347,7 +347,7 @@ PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_
         if (!body->is_listed[k]) continue;
         pliant_f8 low = {0}, high = {0};
         for (int32_t j = e->first[k]; j < e->first[k + 1]; j++) {
-            const float *values = body->listed_fits + 16 * (size_t)e->items[j].other;
+            const float *values = body->listed_fits + 16 * (size_t)e->other[j];
             low += pliant_f8_load(values);
             high += pliant_f8_load(values + 8);
         }
@@ -615,8 +615,8 @@ PLIANT_INLINE void spread_bars(const pliant_body *body, int32_t z, pliant_scratc
     for (int32_t y = range[0]; y < range[1]; y++) {
         float *rows = mean_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD;
         for (int f = 0; f < TURN_COUNT; f++) {
-            pliant_window_along(rows + f * length, blocks, lattice->half_width, scratch->doubled,
-                                scratch->fit_rows, NULL, 8);
+            pliant_window_along(rows + f * length, NULL, blocks, lattice->half_width,
+                                scratch->doubled, scratch->fit_rows, NULL, 8);
             memcpy(rows + f * length, scratch->fit_rows,
                    (size_t)blocks * PLIANT_LANES * sizeof *rows);
         }
@@ -632,7 +632,7 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
     for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
         pliant_f8 total = {0};
         for (int32_t i = e->first[k]; i < e->first[k + 1]; i++)
-            total += pliant_f8_load(body->listed_turns + 16 * (size_t)e->items[i].other);
+            total += pliant_f8_load(body->listed_turns + 16 * (size_t)e->other[i]);
         const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
         float *row = mean_rows(lattice, scratch, at[1], z) + PLIANT_ROW_PAD + at[0];
         for (int f = 0; f < TURN_COUNT; f++) row[f * length] -= total[f];

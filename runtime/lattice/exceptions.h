@@ -13,11 +13,6 @@
 
 #define PLIANT_EXCEPTION_LIMIT 256  // of one region; see bench_lattice
 
-typedef struct pliant_exception {
-    int32_t other;   // index of the particle that is lacked, and whose region lacks this one
-    int8_t step[4];  // its place less this one's; the last is 0
-} pliant_exception;
-
 // Where a particle with an irregular region is in its column.
 typedef struct pliant_exception_place {
     int32_t k;  // its index
@@ -31,7 +26,10 @@ typedef struct pliant_exceptions {
     int32_t *slab_first;                   // shape [slabs + 1]: the first of each slab
     int32_t *column_first;                 // shape [columns + 1] into `column_items`
     pliant_exception_place *column_items;  // shape [count]: those of each column, ascending
-    int32_t *first;                        // shape [count + 1] into `items`
-    pliant_exception *items;
+    // The list of k: items first[k] .. first[k + 1] - 1, an even number, filled up with `count`,
+    // which stands for nothing.
+    int32_t *first;      // shape [count + 1]
+    int32_t *other;      // shape [items]: who is lacked, and whose region lacks k
+    int8_t (*step)[4];   // shape [items]: its place less k's, and 1; all 0 for nothing
     uint8_t *is_listed;  // shape [count]: 1: the region's sums are mended by its list
 } pliant_exceptions;

@@ -311,7 +311,7 @@ static int32_t count_lacking(const pliant_reach *reach, int32_t w)
 // A pair is listed when the sums of either need it. Returns how many items particle k's list has;
 // -1: the other's region does not lack this one.
 static int32_t list_lacking(const pliant_lattice *lattice, const region_work *work, int32_t k,
-                            pliant_exception *items)
+                            int32_t *others, int8_t (*steps)[4])
 {
     const pliant_exceptions *e = &lattice->exceptions;
     const int32_t w = lattice->half_width;
@@ -326,13 +326,28 @@ static int32_t list_lacking(const pliant_lattice *lattice, const region_work *wo
                     lattice->links, at[0] + x - w, at[1] + y - w, at[2] + z - w)];
                 if (other < 0) return -1;
                 if (!e->is_listed[k] && !e->is_listed[other]) continue;
-                if (items)
-                    items[count] = (pliant_exception){
-                        other, {(int8_t)(x - w), (int8_t)(y - w), (int8_t)(z - w), 0}};
+                if (others) {
+                    others[count] = other;
+                    const int8_t step[4] = {(int8_t)(x - w), (int8_t)(y - w), (int8_t)(z - w), 1};
+                    memcpy(steps[count], step, sizeof step);
+                }
                 count++;
             }
         }
+    if (count % 2 == 1) {
+        if (others) {
+            others[count] = e->count;
+            memset(steps[count], 0, sizeof *steps);
+        }
+        count++;
+    }
     return count;
+}
+
+static void lay_out_items(pliant_arena *arena, pliant_exceptions *e)
+{
+    PLIANT_TAKE(arena, e->other, e->first[e->count]);
+    PLIANT_TAKE(arena, e->step, e->first[e->count]);
 }
 
 static pliant_status list_exceptions(pliant_lattice *lattice, region_work *work)
@@ -343,16 +358,17 @@ static pliant_status list_exceptions(pliant_lattice *lattice, region_work *work)
         for (int32_t k = 0; k < e->count; k++) {
             find_members(lattice, work->regions, e->particle[k],
                          work->regions->region_nodes + (size_t)k * stride, &work->reach);
-            const int32_t count =
-                list_lacking(lattice, work, k, pass == 0 ? NULL : e->items + e->first[k]);
+            const int32_t count = pass == 0 ? list_lacking(lattice, work, k, NULL, NULL)
+                                            : list_lacking(lattice, work, k, e->other + e->first[k],
+                                                           e->step + e->first[k]);
             if (count < 0) return PLIANT_ERR_FORMAT;
             if (count > INT32_MAX - e->first[k]) return PLIANT_ERR_MEMORY;
             e->first[k + 1] = e->first[k] + count;
         }
         if (pass > 0) break;
-        PLIANT_TAKE(&lattice->items_arena, e->items, e->first[e->count]);
+        lay_out_items(&lattice->items_arena, e);
         if (pliant_arena_reserve(&lattice->items_arena, NULL) < 0) return PLIANT_ERR_MEMORY;
-        PLIANT_TAKE(&lattice->items_arena, e->items, e->first[e->count]);
+        lay_out_items(&lattice->items_arena, e);
     }
     return PLIANT_OK;
 }

@@ -56,9 +56,9 @@ PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *
         }
         load_row(body, y, z, scratch->rows);
         for (int c = 0; c < 3; c++)
-            pliant_window_along(scratch->rows + c * length + PLIANT_ROW_PAD, lattice->row_blocks,
-                                lattice->half_width, scratch->doubled, bars + 8 * c,
-                                bars + 8 * (3 + c), apart);
+            pliant_window_along(scratch->rows + c * length + PLIANT_ROW_PAD, NULL,
+                                lattice->row_blocks, lattice->half_width, scratch->doubled,
+                                bars + 8 * c, bars + 8 * (3 + c), apart);
     }
 }
 
@@ -169,7 +169,7 @@ void pliant_plates_gather(pliant_body *body, int32_t z, pliant_scratch *scratch)
 
 // ---- Back ----
 
-// What a bar holds, in six padded rows for each row y of the slab.
+// What a bar holds, -p and a, in six padded rows for each row y of the slab.
 PLIANT_INLINE float *bar_rows(const pliant_lattice *lattice, pliant_scratch *scratch, int32_t y,
                               int32_t z)
 {
@@ -177,7 +177,8 @@ PLIANT_INLINE float *bar_rows(const pliant_lattice *lattice, pliant_scratch *scr
            (size_t)(y - lattice->slab_rows[2 * z]) * 6 * pliant_row_length(lattice->row_blocks);
 }
 
-// From plates to bars: p of a bar is the sum of p + (y_bar - y) b.
+// From plates to bars: p of a bar is the sum of p + (y_bar - y) b. (Its negative is what sums and
+// moments of the last direction start from.)
 PLIANT_INLINE void spread_plates(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
@@ -199,7 +200,7 @@ PLIANT_INLINE void spread_plates(const pliant_body *body, int32_t z, pliant_scra
             pliant_window_next(&window, y - range[0], 3, 6, sums, moments);
             float *rows = bar_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD + 8 * k;
             for (int c = 0; c < 3; c++) {
-                pliant_f8_store(rows + c * length, sums[3 + c] - moments[c]);
+                pliant_f8_store(rows + c * length, moments[c] - sums[3 + c]);
                 pliant_f8_store(rows + (3 + c) * length, sums[6 + c]);
             }
         }
@@ -223,32 +224,35 @@ static void spread_restricted(const pliant_body *body, int32_t z, pliant_scratch
             float *bar = bar_rows(lattice, scratch, plate->y + rows[i].row - w, z) +
                          PLIANT_ROW_PAD + plate->x;
             for (int c = 0; c < 3; c++) {
-                bar[c * length] += sums[3 + c] + dy * sums[c];
+                bar[c * length] -= sums[3 + c] + dy * sums[c];
                 bar[(3 + c) * length] += sums[6 + c];
             }
         }
     }
 }
 
-// From bars to particles: the sums of p and of the moments of a, over each row's first three rows.
+// Minus the sums of goals, three rows for each row y of the slab.
+PLIANT_INLINE float *goal_rows(const pliant_lattice *lattice, pliant_scratch *scratch, int32_t y,
+                               int32_t z)
+{
+    return scratch->goals +
+           (size_t)(y - lattice->slab_rows[2 * z]) * 3 * lattice->row_blocks * PLIANT_LANES;
+}
+
+// From bars to particles: the sum of p + (x_i - x) a is minus the sum of -p and of the moment of a.
 PLIANT_INLINE void spread_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
     const int32_t *range = lattice->slab_rows + 2 * z, blocks = lattice->row_blocks;
     const size_t length = pliant_row_length(blocks);
-    float *sum = scratch->bars, *moment = sum + length, *unused = moment + length;
     for (int32_t y = range[0]; y < range[1]; y++) {
         if (row_is_empty(lattice, y, z)) continue;
-        float *rows = bar_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD;
-        for (int c = 0; c < 3; c++) {
-            pliant_window_along(rows + (3 + c) * length, blocks, lattice->half_width,
-                                scratch->doubled, unused, moment, 8);
-            pliant_window_along(rows + c * length, blocks, lattice->half_width, scratch->doubled,
-                                sum, NULL, 8);
-            for (int32_t k = 0; k < blocks; k++)
-                pliant_f8_store(rows + c * length + 8 * k,
-                                pliant_f8_load(sum + 8 * k) - pliant_f8_load(moment + 8 * k));
-        }
+        const float *rows = bar_rows(lattice, scratch, y, z) + PLIANT_ROW_PAD;
+        float *goals = goal_rows(lattice, scratch, y, z);
+        for (int c = 0; c < 3; c++)
+            pliant_window_along(rows + (3 + c) * length, rows + c * length, blocks,
+                                lattice->half_width, scratch->doubled, scratch->bars,
+                                goals + (size_t)c * blocks * PLIANT_LANES, 8);
     }
 }
 
@@ -258,7 +262,7 @@ static void spread_masks(const pliant_body *body, int32_t z, pliant_scratch *scr
     const pliant_lattice *lattice = body->lattice;
     const pliant_irregular *irregular = body->irregular;
     const int32_t w = lattice->half_width, width = 2 * w + 1;
-    const size_t length = pliant_row_length(lattice->row_blocks);
+    const size_t length = (size_t)lattice->row_blocks * PLIANT_LANES;
     for (int32_t n = irregular->slab_head[z]; n >= 0; n = irregular->plates[n].next) {
         const pliant_plate_node *plate = &irregular->plates[n];
         const pliant_row *rows = irregular->rows + (size_t)n * width;
@@ -266,12 +270,11 @@ static void spread_masks(const pliant_body *body, int32_t z, pliant_scratch *scr
         for (int32_t i = 0; i < plate->row_count; i++) {
             if (rows[i].mask & PLIANT_ROW_WHOLE) continue;
             const float dy = (float)(rows[i].row - w);
-            float *row = bar_rows(lattice, scratch, plate->y + rows[i].row - w, z) +
-                         PLIANT_ROW_PAD + plate->x - w;
+            float *row = goal_rows(lattice, scratch, plate->y + rows[i].row - w, z) + plate->x - w;
             for (uint32_t rest = rows[i].mask; rest; rest &= rest - 1) {
                 const int32_t bit = __builtin_ctz(rest);
                 for (int c = 0; c < 3; c++)
-                    row[c * length + bit] += sums[3 + c] + dy * sums[c] + (bit - w) * sums[6 + c];
+                    row[c * length + bit] -= sums[3 + c] + dy * sums[c] + (bit - w) * sums[6 + c];
             }
         }
     }
@@ -282,26 +285,28 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
 {
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
-    const size_t length = pliant_row_length(lattice->row_blocks);
+    const size_t length = (size_t)lattice->row_blocks * PLIANT_LANES;
     for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
-        pliant_f4 total = {0};
-        for (int32_t i = e->first[k]; i < e->first[k + 1]; i++) {
-            const pliant_exception *item = &e->items[i];
-            const float *turn = body->listed_turns + 16 * (size_t)item->other;
-            total += pliant_f4_load(turn) - pliant_f4_load(turn + 4) * (float)item->step[0] -
-                     pliant_f4_load(turn + 8) * (float)item->step[1] -
-                     pliant_f4_load(turn + 12) * (float)item->step[2];
+        pliant_f8 total = {0};
+        for (int32_t i = e->first[k]; i < e->first[k + 1]; i += 2) {
+            const float *one = body->listed_turns + 16 * (size_t)e->other[i];
+            const float *two = body->listed_turns + 16 * (size_t)e->other[i + 1];
+            const pliant_f8 step = pliant_f8_steps(e->step[i]);
+            total += pliant_f8_load(one) * pliant_f8_of(3, 3, 3, 3, 0, 0, 0, 0, step) +
+                     pliant_f8_load(one + 8) * pliant_f8_of(1, 1, 1, 1, 2, 2, 2, 2, step) +
+                     pliant_f8_load(two) * pliant_f8_of(7, 7, 7, 7, 4, 4, 4, 4, step) +
+                     pliant_f8_load(two + 8) * pliant_f8_of(5, 5, 5, 5, 6, 6, 6, 6, step);
         }
         const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        float *row = bar_rows(lattice, scratch, at[1], z) + PLIANT_ROW_PAD + at[0];
-        for (int c = 0; c < 3; c++) row[c * length] -= total[c];
+        float *row = goal_rows(lattice, scratch, at[1], z) + at[0];
+        for (int c = 0; c < 3; c++) row[c * length] += total[c] + total[4 + c];
     }
 }
 
 PLIANT_INLINE void accelerate(pliant_body *body, int32_t z, float h, pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
-    const size_t length = pliant_row_length(lattice->row_blocks);
+    const size_t length = (size_t)lattice->row_blocks * PLIANT_LANES;
     const pliant_f8 rate = pliant_f8_all(1 / h), step = pliant_f8_all(h);
     const float gravity[3] = {body->gravity.x, body->gravity.y, body->gravity.z};
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
@@ -310,7 +315,7 @@ PLIANT_INLINE void accelerate(pliant_body *body, int32_t z, float h, pliant_scra
             &body->particle_constants[body->particle_constants_of[b]];
         const pliant_f8 inverse = pliant_f8_load(constants->inverse_size);
         const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
-        const float *goal = bar_rows(lattice, scratch, place[1], z) + PLIANT_ROW_PAD + 8 * place[0];
+        const float *goal = goal_rows(lattice, scratch, place[1], z) + 8 * place[0];
         const float *x = body->x + (size_t)b * 3 * PLIANT_LANES;
         const float *a = body->acceleration + (size_t)b * 3 * PLIANT_LANES;
         float *v = body->v + (size_t)b * 3 * PLIANT_LANES;
@@ -319,7 +324,7 @@ PLIANT_INLINE void accelerate(pliant_body *body, int32_t z, float h, pliant_scra
             pliant_f8 pull = pliant_f8_all(gravity[c]);
             if (body->has_forces) pull += pliant_f8_load(a + 8 * c);
             const pliant_f8 change =
-                rate * (inverse * pliant_f8_load(goal + c * length) - offset) + step * pull;
+                step * pull - rate * (inverse * pliant_f8_load(goal + c * length) + offset);
             pliant_f8_store(v + 8 * c, pliant_f8_load(v + 8 * c) + is_particle * change);
         }
     }

@@ -21,6 +21,7 @@ typedef float pliant_f8 __attribute__((vector_size(32), may_alias));
 typedef float pliant_f8_anywhere __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t pliant_bits8 __attribute__((vector_size(32)));
 typedef float pliant_f4 __attribute__((vector_size(16), aligned(4), may_alias));
+typedef int8_t pliant_bytes8 __attribute__((vector_size(8), aligned(1), may_alias));
 #define PLIANT_INLINE static inline __attribute__((always_inline))
 
 // (Macros: vectors as arguments and results would pass differently from clone to clone.)
@@ -28,7 +29,13 @@ typedef float pliant_f4 __attribute__((vector_size(16), aligned(4), may_alias));
 #define pliant_f8_store(p, v) (*(pliant_f8_anywhere *)(void *)(p) = (v))
 #define pliant_f4_load(p)     (*(const pliant_f4 *)(const void *)(p))
 #define pliant_f4_store(p, v) (*(pliant_f4 *)(void *)(p) = (v))
-#define pliant_f8_all(x)      ((pliant_f8){0} + (x))
+#define pliant_f8_of(p0, p1, p2, p3, p4, p5, p6, p7, v)                                            \
+    __builtin_shufflevector((v), (v), p0, p1, p2, p3, p4, p5, p6, p7)
+#define pliant_f8_all(x) ((pliant_f8){0} + (x))
+
+// Eight small whole numbers, as floats.
+#define pliant_f8_steps(p)                                                                         \
+    __builtin_convertvector(*(const pliant_bytes8 *)(const void *)(p), pliant_f8)
 
 // ---- Rows above each other ----
 
@@ -118,33 +125,42 @@ static inline size_t pliant_row_length(int32_t blocks)
 }
 
 // Sums and moments over the window of every place of a row: `v` is its place 0 within a padded row,
-// out and moment hold `blocks` blocks; moment may be NULL. `scratch` has room for 4 padded rows.
-// With `apart` > 0 the blocks of out and moment lie that many floats apart.
-PLIANT_INLINE void pliant_window_along(const float *v, int32_t blocks, int32_t w, float *scratch,
-                                       float *out, float *moment, size_t apart)
+// out and moment hold `blocks` blocks, `apart` floats apart; moment may be NULL. With `more`, a row
+// like v, its sums are added to the moments. `scratch` has room for 4 padded rows.
+PLIANT_INLINE void pliant_window_along(const float *v, const float *more, int32_t blocks, int32_t w,
+                                       float *scratch, float *out, float *moment, size_t apart)
 {
     if (w == 1) {
         for (int32_t k = 0; k < blocks; k++) {
-            const pliant_f8 low = pliant_f8_load(v + 8 * k - 1),
-                            high = pliant_f8_load(v + 8 * k + 1);
-            pliant_f8_store(out + apart * k, low + high + pliant_f8_load(v + 8 * k));
-            if (moment) pliant_f8_store(moment + apart * k, high - low);
+            const float *at = v + 8 * k;
+            const pliant_f8 low = pliant_f8_load(at - 1), high = pliant_f8_load(at + 1);
+            pliant_f8_store(out + apart * k, low + high + pliant_f8_load(at));
+            if (!moment) continue;
+            pliant_f8 difference = high - low;
+            if (more) {
+                const float *there = more + 8 * k;
+                difference +=
+                    pliant_f8_load(there - 1) + pliant_f8_load(there + 1) + pliant_f8_load(there);
+            }
+            pliant_f8_store(moment + apart * k, difference);
         }
         return;
     }
     // s and m: sums and moments about the first place of `width` places from each place on. A
     // window of 2w + 1 = 1 + 2 + 4 + ... (its binary digits) is picked up as the widths come by.
     const int32_t count = blocks * PLIANT_LANES + (2 * w + 7) / 8 * 8;  // places from -w on
-    const size_t length = (size_t)blocks * PLIANT_LANES + 3 * PLIANT_ROW_PAD;
-    float *s = scratch, *m = scratch + length, *s2 = m + length, *m2 = s2 + length;
-    const float *from = v - w;
+    const size_t length = pliant_row_length(blocks);
+    float *s = scratch, *m = s + length, *s2 = m + length, *m2 = s2 + length;
     for (int32_t i = 0; i < count; i += 8) {
-        pliant_f8_store(s + i, pliant_f8_load(from + i));
-        if (moment) pliant_f8_store(m + i, (pliant_f8){0});
+        pliant_f8_store(s + i, pliant_f8_load(v - w + i));
+        if (!moment) continue;
+        pliant_f8 first = {0};
+        if (more) first += pliant_f8_load(more - w + i);
+        pliant_f8_store(m + i, first);
     }
     for (int32_t k = 0; k < blocks; k++) {
         pliant_f8_store(out + apart * k, pliant_f8_load(s + 8 * k));
-        if (moment) pliant_f8_store(moment + apart * k, (pliant_f8){0});
+        if (moment) pliant_f8_store(moment + apart * k, pliant_f8_load(m + 8 * k));
     }
     int32_t covered = 1;
     for (int32_t width = 1, digits = (2 * w + 1) >> 1; digits; digits >>= 1, width *= 2) {
