@@ -6,6 +6,7 @@
 #include "lattice/plates.h"
 #include "lattice/window.h"
 #include "pliant/error.h"
+#include "pliant/vector_clones.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -410,15 +411,33 @@ void pliant_body_match(pliant_body *body, float h)
     body->times.damping = pliant_clock_ns() - scattered;
 }
 
+PLIANT_VECTOR_CLONES
+static void move_blocks(pliant_body *body, int32_t first, int32_t last, float h)
+{
+    const float extent = PLIANT_BODY_EXTENT * body->lattice->cell_size;
+    const float *restrict v = body->v;
+    float *restrict positions = body->x;
+    const size_t end = (size_t)last * 3 * PLIANT_LANES;
+    for (size_t i = (size_t)first * 3 * PLIANT_LANES; i < end; i++) {
+        const float x = positions[i] + h * v[i];
+        const float below = x < extent ? x : extent;
+        positions[i] = below > -extent ? below : -extent;
+    }
+}
+
+static void move_slab(void *context, int32_t z, int32_t worker)
+{
+    (void)worker;
+    const match_task *task = context;
+    const int32_t *first = task->body->lattice->slab_first + z;
+    move_blocks(task->body, first[0], first[1], task->h);
+}
+
 void pliant_body_move(pliant_body *body, float h)
 {
     const int64_t start = pliant_clock_ns();
-    const size_t count = (size_t)body->lattice->block_count * 3 * PLIANT_LANES;
-    const float extent = PLIANT_BODY_EXTENT * body->lattice->cell_size;
-    for (size_t i = 0; i < count; i++) {
-        const float x = body->x[i] + h * body->v[i];
-        body->x[i] = x > extent ? extent : x < -extent ? -extent : x;
-    }
+    match_task task = {body, h};
+    pliant_team_run(body->team, body->lattice->dims[2], move_slab, &task);
     if (body->fracture) (void)pliant_fracture_break(body);
     body->step_count++;
     body->times.move = pliant_clock_ns() - start;

@@ -390,8 +390,9 @@ static pliant_status add_regions(pliant_lattice *lattice, region_work *work)
         work->exception_of[i] = is_irregular ? next : -1;
         if (!is_irregular) continue;
         const int32_t k = next++;
+        const int32_t lacking = count_lacking(&work->reach, lattice->half_width);
         lattice->exceptions.is_listed[k] =
-            count_lacking(&work->reach, lattice->half_width) <= PLIANT_EXCEPTION_LIMIT;
+            lacking <= PLIANT_EXCEPTION_LIMIT && lacking <= regions->size[i] / 2;
         if (lattice->exceptions.is_listed[k]) continue;
         if (pliant_irregular_add(&lattice->irregular, &place, &work->reach,
                                  PLIANT_REGION_CHEAPEST) < 0)

@@ -146,51 +146,46 @@ PLIANT_INLINE void pliant_window_along(const float *v, const float *more, int32_
         }
         return;
     }
-    // s and m: sums and moments about the first place of `width` places from each place on. A
-    // window of 2w + 1 = 1 + 2 + 4 + ... (its binary digits) is picked up as the widths come by.
+    // s and m: sums and moments about the first place of `width` places from each place on, width 1
+    // being the rows themselves. A window of 2w + 1 = 1 + 2 + 4 + ... (its binary digits) is picked
+    // up as the widths come by: first 1, then `covered` grows by each.
     const int32_t count = blocks * PLIANT_LANES + (2 * w + 7) / 8 * 8;  // places from -w on
     const size_t length = pliant_row_length(blocks);
-    float *s = scratch, *m = s + length, *s2 = m + length, *m2 = s2 + length;
-    for (int32_t i = 0; i < count; i += 8) {
-        pliant_f8_store(s + i, pliant_f8_load(v - w + i));
-        if (!moment) continue;
-        pliant_f8 first = {0};
-        if (more) first += pliant_f8_load(more - w + i);
-        pliant_f8_store(m + i, first);
-    }
+    float *s2 = scratch, *m2 = s2 + length, *s3 = m2 + length, *m3 = s3 + length;
+    const float *s = v - w, *m = more ? more - w : NULL;
     for (int32_t k = 0; k < blocks; k++) {
+        pliant_f8 first = {0};
+        if (m) first += pliant_f8_load(m + 8 * k);
         pliant_f8_store(out + apart * k, pliant_f8_load(s + 8 * k));
-        if (moment) pliant_f8_store(moment + apart * k, pliant_f8_load(m + 8 * k));
+        if (moment) pliant_f8_store(moment + apart * k, first);
     }
+    const pliant_f8 half = pliant_f8_all((float)w);
     int32_t covered = 1;
     for (int32_t width = 1, digits = (2 * w + 1) >> 1; digits; digits >>= 1, width *= 2) {
         const pliant_f8 step = pliant_f8_all((float)width);
         for (int32_t i = 0; i + width < count; i += 8) {
             const pliant_f8 next = pliant_f8_load(s + i + width);
             pliant_f8_store(s2 + i, pliant_f8_load(s + i) + next);
-            if (moment)
-                pliant_f8_store(m2 + i, pliant_f8_load(m + i) + pliant_f8_load(m + i + width) +
-                                            step * next);
+            if (!moment) continue;
+            pliant_f8 both = step * next;
+            if (m) both += pliant_f8_load(m + i) + pliant_f8_load(m + i + width);
+            pliant_f8_store(m2 + i, both);
         }
-        float *swap = s;
-        s = s2, s2 = swap;
-        swap = m;
-        m = m2, m2 = swap;
+        s = s2, m = moment ? m2 : NULL;
+        s2 = s3, s3 = (float *)s;
+        m2 = m3, m3 = (float *)m;
         if (!(digits & 1)) continue;
         const pliant_f8 offset = pliant_f8_all((float)covered);
         for (int32_t k = 0; k < blocks; k++) {
             const pliant_f8 sum = pliant_f8_load(s + 8 * k + covered);
-            pliant_f8_store(out + apart * k, pliant_f8_load(out + apart * k) + sum);
-            if (moment)
-                pliant_f8_store(moment + apart * k, pliant_f8_load(moment + apart * k) +
-                                                        pliant_f8_load(m + 8 * k + covered) +
-                                                        offset * sum);
+            const pliant_f8 total = pliant_f8_load(out + apart * k) + sum;
+            pliant_f8_store(out + apart * k, total);
+            if (!moment) continue;
+            pliant_f8 about = pliant_f8_load(moment + apart * k) +
+                              pliant_f8_load(m + 8 * k + covered) + offset * sum;
+            if (digits == 1) about -= half * total;  // about the middle, at last
+            pliant_f8_store(moment + apart * k, about);
         }
         covered += 2 * width;
     }
-    if (!moment) return;
-    const pliant_f8 half = pliant_f8_all((float)w);
-    for (int32_t k = 0; k < blocks; k++)
-        pliant_f8_store(moment + apart * k, pliant_f8_load(moment + apart * k) -
-                                                half * pliant_f8_load(out + apart * k));
 }
