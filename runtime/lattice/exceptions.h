@@ -11,7 +11,9 @@
 #include "pliant/arena.h"
 #include "pliant/regions.h"
 
-#define PLIANT_EXCEPTION_LIMIT 256  // of one region; see bench_lattice
+#define PLIANT_EXCEPTION_LIMIT 256  // of one region,
+#define PLIANT_EXCEPTION_FEW                                                                       \
+    32  // and where it has less than twice as many itself; see bench_lattice
 
 // Where a particle with an irregular region is in its column.
 typedef struct pliant_exception_place {

@@ -392,7 +392,8 @@ static pliant_status add_regions(pliant_lattice *lattice, region_work *work)
         const int32_t k = next++;
         const int32_t lacking = count_lacking(&work->reach, lattice->half_width);
         lattice->exceptions.is_listed[k] =
-            lacking <= PLIANT_EXCEPTION_LIMIT && lacking <= regions->size[i] / 2;
+            lacking <= PLIANT_EXCEPTION_LIMIT &&
+            (lacking <= PLIANT_EXCEPTION_FEW || lacking <= regions->size[i] / 2);
         if (lattice->exceptions.is_listed[k]) continue;
         if (pliant_irregular_add(&lattice->irregular, &place, &work->reach,
                                  PLIANT_REGION_CHEAPEST) < 0)
