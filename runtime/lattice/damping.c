@@ -629,12 +629,13 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
     const size_t length = pliant_row_length(lattice->row_blocks);
-    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
+    for (int32_t j = e->slab_first[z]; j < e->slab_first[z + 1]; j++) {
+        const pliant_exception_row *place = &e->slab_items[j];
+        const int32_t k = place->k;
         pliant_f8 total = {0};
         for (int32_t i = e->first[k]; i < e->first[k + 1]; i++)
             total += pliant_f8_load(body->listed_turns + 16 * (size_t)e->other[i]);
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        float *row = mean_rows(lattice, scratch, at[1], z) + PLIANT_ROW_PAD + at[0];
+        float *row = scratch->rows + (size_t)place->row * 6 * length + PLIANT_ROW_PAD + place->x;
         for (int f = 0; f < TURN_COUNT; f++) row[f * length] -= total[f];
     }
 }

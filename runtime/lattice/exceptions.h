@@ -22,12 +22,21 @@ typedef struct pliant_exception_place {
     int32_t lane;
 } pliant_exception_place;
 
+// Where it is in its slab.
+typedef struct pliant_exception_row {
+    int32_t k;
+    int32_t row, x;  // above the slab's first row; along it
+} pliant_exception_row;
+
 typedef struct pliant_exceptions {
-    int32_t count;                         // particles with irregular regions, ascending
-    int32_t *particle;                     // shape [count]
-    int32_t *slab_first;                   // shape [slabs + 1]: the first of each slab
-    int32_t *column_first;                 // shape [columns + 1] into `column_items`
-    pliant_exception_place *column_items;  // shape [count]: those of each column, ascending
+    int32_t count;          // particles with irregular regions, ascending
+    int32_t *particle;      // shape [count]
+    int32_t *slab_first;    // shape [slabs + 1]: the first of each slab
+    int32_t *column_first;  // shape [columns + 1] into `column_items`
+    // Those of each column and of each slab, the longest lists first: loops over lists then end
+    // where the processor expects it.
+    pliant_exception_place *column_items;  // shape [count]
+    pliant_exception_row *slab_items;      // shape [count]
     // The list of k: items first[k] .. first[k + 1] - 1, an even number, filled up with `count`,
     // which stands for nothing.
     int32_t *first;      // shape [count + 1]

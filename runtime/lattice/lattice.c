@@ -262,6 +262,7 @@ static void lay_out_exceptions(pliant_arena *arena, pliant_lattice *lattice)
     PLIANT_TAKE(arena, e->slab_first, lattice->dims[2] + 1);
     PLIANT_TAKE(arena, e->column_first, lattice->column_count + 1);
     PLIANT_TAKE(arena, e->column_items, e->count);
+    PLIANT_TAKE(arena, e->slab_items, e->count);
     PLIANT_TAKE(arena, e->first, e->count + 1);
     PLIANT_TAKE(arena, e->is_listed, e->count);
 }
@@ -287,6 +288,43 @@ static void index_exceptions(pliant_lattice *lattice, const pliant_regions *regi
     }
     for (int32_t c = 0; c < lattice->column_count; c++) e->column_first[c] = e->column_first[c + 1];
     e->column_first[lattice->column_count] = e->count;
+}
+
+static int32_t list_length(const pliant_exceptions *e, int32_t k)
+{
+    return e->first[k + 1] - e->first[k];
+}
+
+static int compare_places(const void *a, const void *b, void *exceptions)
+{
+    const pliant_exception_place *p = a, *q = b;
+    const int32_t longer = list_length(exceptions, q->k) - list_length(exceptions, p->k);
+    return longer ? longer : p->k - q->k;
+}
+
+static int compare_rows(const void *a, const void *b, void *exceptions)
+{
+    const pliant_exception_row *p = a, *q = b;
+    const int32_t longer = list_length(exceptions, q->k) - list_length(exceptions, p->k);
+    return longer ? longer : p->k - q->k;
+}
+
+// Once the lists' lengths are known.
+static void order_exceptions(pliant_lattice *lattice)
+{
+    pliant_exceptions *e = &lattice->exceptions;
+    for (int32_t c = 0; c < lattice->column_count; c++)
+        qsort_r(e->column_items + e->column_first[c],
+                (size_t)(e->column_first[c + 1] - e->column_first[c]), sizeof *e->column_items,
+                compare_places, e);
+    for (int32_t z = 0; z < lattice->dims[2]; z++) {
+        for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
+            const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
+            e->slab_items[k] = (pliant_exception_row){k, at[1] - lattice->slab_rows[2 * z], at[0]};
+        }
+        qsort_r(e->slab_items + e->slab_first[z], (size_t)(e->slab_first[z + 1] - e->slab_first[z]),
+                sizeof *e->slab_items, compare_rows, e);
+    }
 }
 
 // What is needed while the regions are laid out.
@@ -370,6 +408,7 @@ static pliant_status list_exceptions(pliant_lattice *lattice, region_work *work)
         if (pliant_arena_reserve(&lattice->items_arena, NULL) < 0) return PLIANT_ERR_MEMORY;
         lay_out_items(&lattice->items_arena, e);
     }
+    order_exceptions(lattice);
     return PLIANT_OK;
 }
 

@@ -286,7 +286,9 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
     const pliant_lattice *lattice = body->lattice;
     const pliant_exceptions *e = &lattice->exceptions;
     const size_t length = (size_t)lattice->row_blocks * PLIANT_LANES;
-    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
+    for (int32_t j = e->slab_first[z]; j < e->slab_first[z + 1]; j++) {
+        const pliant_exception_row *place = &e->slab_items[j];
+        const int32_t k = place->k;
         pliant_f8 total = {0};
         for (int32_t i = e->first[k]; i < e->first[k + 1]; i += 2) {
             const float *one = body->listed_turns + 16 * (size_t)e->other[i];
@@ -297,8 +299,7 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
                      pliant_f8_load(two) * pliant_f8_of(7, 7, 7, 7, 4, 4, 4, 4, step) +
                      pliant_f8_load(two + 8) * pliant_f8_of(5, 5, 5, 5, 6, 6, 6, 6, step);
         }
-        const int32_t *at = lattice->places + 3 * (size_t)e->particle[k];
-        float *row = goal_rows(lattice, scratch, at[1], z) + at[0];
+        float *row = scratch->goals + (size_t)place->row * 3 * length + place->x;
         for (int c = 0; c < 3; c++) row[c * length] += total[c] + total[4 + c];
     }
 }
