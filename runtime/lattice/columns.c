@@ -214,7 +214,7 @@ PLIANT_INLINE void match_regions(pliant_body *body, int32_t column, float *turns
             block_count += is_block;
             group.constants[i] =
                 is_block ? &body->region_constants[body->region_constants_of[turn]] : NULL;
-            if (!is_block && w == 1) continue;
+            if (!is_block && w <= PLIANT_WINDOW_DIRECT) continue;
             pliant_f8 sum[9], moment[3];
             pliant_window_next(&window, s, 3, 6, sum, moment);
             for (int f = 0; f < 9; f++) pliant_f8_store(group.sums[i] + 8 * f, sum[f]);

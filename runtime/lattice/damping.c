@@ -228,7 +228,7 @@ PLIANT_INLINE void gather_plates(const pliant_body *body, int32_t z, pliant_scra
             const int32_t column =
                 y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
             float *site = column < 0 ? NULL : site_at(body, column, z);
-            if (!site && w == 1) continue;
+            if (!site && w <= PLIANT_WINDOW_DIRECT) continue;
             pliant_f8 sums[FIT_COUNT], none[1];
             pliant_window_next(&window, y - first, 0, FIT_COUNT, sums, none);
             if (!site) continue;
@@ -435,7 +435,8 @@ PLIANT_INLINE void fit_regions(pliant_body *body, int32_t column, pliant_scratch
         float *turn = scratch->turns + (size_t)s * TURN_FLOATS;
         const int32_t block = lattice->turn_block[c->first_turn + s];
         pliant_f8 sums[FIT_COUNT], none[1];
-        if (block >= 0 || w > 1) pliant_window_next(&window, s, 0, FIT_COUNT, sums, none);
+        if (block >= 0 || w > PLIANT_WINDOW_DIRECT)
+            pliant_window_next(&window, s, 0, FIT_COUNT, sums, none);
         if (block < 0) {
             memset(turn, 0, TURN_FLOATS * sizeof *turn);
             continue;

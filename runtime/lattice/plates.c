@@ -85,7 +85,7 @@ PLIANT_INLINE void sum_plates(pliant_body *body, int32_t z, pliant_scratch *scra
             const int32_t column =
                 y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
             float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
-            if (!site && w == 1) continue;
+            if (!site && w <= PLIANT_WINDOW_DIRECT) continue;
             pliant_f8 sums[6], moments[3];
             pliant_window_next(&window, y - first, 3, 3, sums, moments);
             if (!site) continue;

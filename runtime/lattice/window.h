@@ -50,6 +50,9 @@ typedef struct pliant_window {
 
 #define PLIANT_WINDOW_FIELDS 18  // with moments and without, of one kind of row
 
+// Up to here windows are added up directly, which is as quick, and may be left out.
+#define PLIANT_WINDOW_DIRECT 2
+
 // The sums of window s, for s = 0, 1, 2, ... in turn: out[with + plain] sums, then moments[with].
 PLIANT_INLINE void pliant_window_next(pliant_window *window, int32_t s, const int32_t with,
                                       const int32_t plain, pliant_f8 *out, pliant_f8 *moments)
@@ -63,6 +66,16 @@ PLIANT_INLINE void pliant_window_next(pliant_window *window, int32_t s, const in
                             high = pliant_f8_load(above + 8 * f);
             out[f] = low + high + pliant_f8_load(here + 8 * f);
             if (f < with) moments[f] = high - low;
+        }
+        return;
+    }
+    if (w == 2) {
+        const float *const *r = rows + s;
+        for (int32_t f = 0; f < fields; f++) {
+            const pliant_f8 v0 = pliant_f8_load(r[0] + 8 * f), v1 = pliant_f8_load(r[1] + 8 * f);
+            const pliant_f8 v3 = pliant_f8_load(r[3] + 8 * f), v4 = pliant_f8_load(r[4] + 8 * f);
+            out[f] = (v0 + v4) + (v1 + v3) + pliant_f8_load(r[2] + 8 * f);
+            if (f < with) moments[f] = 2 * (v4 - v0) + (v3 - v1);
         }
         return;
     }
@@ -141,6 +154,24 @@ PLIANT_INLINE void pliant_window_along(const float *v, const float *more, int32_
                 const float *there = more + 8 * k;
                 difference +=
                     pliant_f8_load(there - 1) + pliant_f8_load(there + 1) + pliant_f8_load(there);
+            }
+            pliant_f8_store(moment + apart * k, difference);
+        }
+        return;
+    }
+    if (w == 2) {
+        for (int32_t k = 0; k < blocks; k++) {
+            const float *at = v + 8 * k;
+            const pliant_f8 v0 = pliant_f8_load(at - 2), v1 = pliant_f8_load(at - 1);
+            const pliant_f8 v3 = pliant_f8_load(at + 1), v4 = pliant_f8_load(at + 2);
+            pliant_f8_store(out + apart * k, (v0 + v4) + (v1 + v3) + pliant_f8_load(at));
+            if (!moment) continue;
+            pliant_f8 difference = 2 * (v4 - v0) + (v3 - v1);
+            if (more) {
+                const float *there = more + 8 * k;
+                difference += (pliant_f8_load(there - 2) + pliant_f8_load(there + 2)) +
+                              (pliant_f8_load(there - 1) + pliant_f8_load(there + 1)) +
+                              pliant_f8_load(there);
             }
             pliant_f8_store(moment + apart * k, difference);
         }
