@@ -42,6 +42,32 @@ typedef struct rigid_motion {
     double centre[3], velocity[3], omega[3];  // about the origin of the sums
 } rigid_motion;
 
+// The same as a + omega cross x, x from the body's origin.
+typedef struct rigid_field {
+    float a[3], omega[3];
+} rigid_field;
+
+static rigid_field field_of(const rigid_motion *m)
+{
+    rigid_field field;
+    for (int c = 0; c < 3; c++) {
+        const int d = (c + 1) % 3, e = (c + 2) % 3;
+        field.a[c] =
+            (float)(m->velocity[c] - (m->omega[d] * m->centre[e] - m->omega[e] * m->centre[d]));
+        field.omega[c] = (float)m->omega[c];
+    }
+    return field;
+}
+
+PLIANT_INLINE void evaluate(const rigid_field *field, const pliant_f8 x[3], pliant_f8 v[3])
+{
+    for (int c = 0; c < 3; c++) {
+        const int d = (c + 1) % 3, e = (c + 2) % 3;
+        v[c] = pliant_f8_all(field->a[c]) +
+               (pliant_f8_all(field->omega[d]) * x[e] - pliant_f8_all(field->omega[e]) * x[d]);
+    }
+}
+
 PLIANT_VECTOR_CLONES
 static void sum_slab(const pliant_body *body, int32_t z, double *sums)
 {
@@ -117,6 +143,7 @@ typedef struct damp_task {
     pliant_body *body;
     float k;
     rigid_motion whole;
+    rigid_field field;  // of `whole`
 } damp_task;
 
 static void sum_task(void *context, int32_t z, int32_t worker)
@@ -126,19 +153,26 @@ static void sum_task(void *context, int32_t z, int32_t worker)
     sum_slab(task->body, z, task->body->slab_sums + (size_t)z * ALL_COUNT);
 }
 
-static rigid_motion measure_whole(damp_task *task)
+static void add_slabs(const pliant_body *body, double *sums)
 {
-    pliant_body *body = task->body;
-    pliant_team_run(body->team, body->lattice->dims[2], sum_task, task);
-    double sums[ALL_COUNT] = {0};
+    for (int f = 0; f < ALL_COUNT; f++) sums[f] = 0;
     for (int32_t z = 0; z < body->lattice->dims[2]; z++)
         for (int f = 0; f < ALL_COUNT; f++) sums[f] += body->slab_sums[(size_t)z * ALL_COUNT + f];
-    return fit_whole(sums);
 }
 
-// v = (1 - k) v + k (velocity + omega cross (x - centre)) for a slab; k < 0: v += -k of the latter.
+static void measure_whole(damp_task *task)
+{
+    double sums[ALL_COUNT];
+    pliant_team_run(task->body->team, task->body->lattice->dims[2], sum_task, task);
+    add_slabs(task->body, sums);
+    task->whole = fit_whole(sums);
+    task->field = field_of(&task->whole);
+}
+
+// v = keep v + add (a + omega cross x) for a slab.
 PLIANT_VECTOR_CLONES
-static void blend_slab(pliant_body *body, int32_t z, const rigid_motion *m, float keep, float add)
+static void blend_slab(pliant_body *body, int32_t z, const rigid_field *field, float keep,
+                       float add)
 {
     const pliant_lattice *lattice = body->lattice;
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
@@ -146,34 +180,31 @@ static void blend_slab(pliant_body *body, int32_t z, const rigid_motion *m, floa
             pliant_f8_load(body->particle_constants[body->particle_constants_of[b]].is_particle);
         const float *xs = body->x + (size_t)b * 3 * PLIANT_LANES;
         float *vs = body->v + (size_t)b * 3 * PLIANT_LANES;
-        pliant_f8 x[3];
+        pliant_f8 x[3], rigid[3];
         for (int c = 0; c < 3; c++)
-            x[c] =
-                pliant_f8_load(xs + 8 * c) - pliant_f8_all((float)(body->origin[c] + m->centre[c]));
-        for (int c = 0; c < 3; c++) {
-            const int d = (c + 1) % 3, e = (c + 2) % 3;
-            const pliant_f8 rigid = pliant_f8_all((float)m->velocity[c]) +
-                                    pliant_f8_all((float)m->omega[d]) * x[e] -
-                                    pliant_f8_all((float)m->omega[e]) * x[d];
+            x[c] = pliant_f8_load(xs + 8 * c) - pliant_f8_all(body->origin[c]);
+        evaluate(field, x, rigid);
+        for (int c = 0; c < 3; c++)
             pliant_f8_store(vs + 8 * c, pliant_f8_all(keep) * pliant_f8_load(vs + 8 * c) +
-                                            pliant_f8_all(add) * is_particle * rigid);
-        }
+                                            pliant_f8_all(add) * is_particle * rigid[c]);
     }
 }
 
 // ---- There ----
 
-// The fit's fields of a block's particles, before they are weighed.
-PLIANT_INLINE void fields_of(const pliant_body *body, int32_t block, pliant_f8 *fields)
+// The fit's fields of a block's particles, of what their velocities are beyond the whole's motion.
+PLIANT_INLINE void fields_of(const pliant_body *body, const rigid_field *whole, int32_t block,
+                             pliant_f8 *fields)
 {
     const pliant_f8 share =
         pliant_f8_load(body->particle_constants[body->particle_constants_of[block]].share);
     const float *xs = body->x + (size_t)block * 3 * PLIANT_LANES;
     const float *vs = body->v + (size_t)block * 3 * PLIANT_LANES;
-    pliant_f8 x[3], v[3], mx[3];
+    pliant_f8 x[3], v[3], mx[3], rigid[3];
+    for (int c = 0; c < 3; c++) x[c] = pliant_f8_load(xs + 8 * c) - pliant_f8_all(body->origin[c]);
+    evaluate(whole, x, rigid);
     for (int c = 0; c < 3; c++) {
-        x[c] = pliant_f8_load(xs + 8 * c) - pliant_f8_all(body->origin[c]);
-        v[c] = pliant_f8_load(vs + 8 * c);
+        v[c] = pliant_f8_load(vs + 8 * c) - rigid[c];
         mx[c] = share * x[c];
         fields[FIT_V + c] = share * v[c];
         fields[FIT_X + c] = mx[c];
@@ -187,7 +218,8 @@ PLIANT_INLINE void fields_of(const pliant_body *body, int32_t block, pliant_f8 *
     }
 }
 
-PLIANT_INLINE void gather_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
+PLIANT_INLINE void gather_bars(const pliant_body *body, const rigid_field *whole, int32_t z,
+                               pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
     const int32_t *range = lattice->slab_rows + 2 * z, blocks = lattice->row_blocks;
@@ -196,7 +228,7 @@ PLIANT_INLINE void gather_bars(const pliant_body *body, int32_t z, pliant_scratc
         const int32_t *block_at = lattice->block_at + ((size_t)z * lattice->dims[1] + y) * blocks;
         for (int32_t k = 0; k < blocks; k++) {
             pliant_f8 fields[FIT_COUNT] = {{0}};
-            if (block_at[k] >= 0) fields_of(body, block_at[k], fields);
+            if (block_at[k] >= 0) fields_of(body, whole, block_at[k], fields);
             for (int f = 0; f < FIT_COUNT; f++)
                 pliant_f8_store(scratch->fit_rows + f * length + PLIANT_ROW_PAD + 8 * k, fields[f]);
         }
@@ -238,15 +270,18 @@ PLIANT_INLINE void gather_plates(const pliant_body *body, int32_t z, pliant_scra
 }
 
 // The fit's fields of one particle, weighed, into values[16].
-static void fields_of_one(const pliant_body *body, int32_t slot, float *values)
+static void fields_of_one(const pliant_body *body, const rigid_field *whole, int32_t slot,
+                          float *values)
 {
     const int32_t block = slot / (3 * PLIANT_LANES);
     const float share =
         body->particle_constants[body->particle_constants_of[block]].share[slot % PLIANT_LANES];
     float x[3], v[3];
+    for (int c = 0; c < 3; c++) x[c] = body->x[slot + PLIANT_LANES * c] - body->origin[c];
     for (int c = 0; c < 3; c++) {
-        x[c] = body->x[slot + PLIANT_LANES * c] - body->origin[c];
-        v[c] = body->v[slot + PLIANT_LANES * c];
+        const int d = (c + 1) % 3, e = (c + 2) % 3;
+        v[c] = body->v[slot + PLIANT_LANES * c] -
+               (whole->a[c] + (whole->omega[d] * x[e] - whole->omega[e] * x[d]));
         values[FIT_V + c] = share * v[c];
         values[FIT_X + c] = share * x[c];
     }
@@ -267,7 +302,8 @@ static int32_t slot_at(const pliant_lattice *lattice, int32_t x, int32_t y, int3
            x % PLIANT_LANES;
 }
 
-static void gather_restricted(const pliant_body *body, int32_t z, const pliant_scratch *scratch)
+static void gather_restricted(const pliant_body *body, const rigid_field *whole, int32_t z,
+                              const pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
     const pliant_irregular *irregular = body->irregular;
@@ -289,29 +325,30 @@ static void gather_restricted(const pliant_body *body, int32_t z, const pliant_s
             }
             for (uint32_t rest = rows[i].mask; rest; rest &= rest - 1) {
                 float values[FIT_COUNT];
-                fields_of_one(body, slot_at(lattice, plate->x + __builtin_ctz(rest) - w, y, z),
-                              values);
+                fields_of_one(body, whole,
+                              slot_at(lattice, plate->x + __builtin_ctz(rest) - w, y, z), values);
                 for (int f = 0; f < FIT_COUNT; f++) sums[f] += values[f];
             }
         }
     }
 }
 
-static void gather_listed(const pliant_body *body, int32_t z)
+static void gather_listed(const pliant_body *body, const rigid_field *whole, int32_t z)
 {
     const pliant_exceptions *e = &body->lattice->exceptions;
     for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++)
-        fields_of_one(body, body->lattice->slot[e->particle[k]],
+        fields_of_one(body, whole, body->lattice->slot[e->particle[k]],
                       body->listed_fits + 16 * (size_t)k);
 }
 
 PLIANT_VECTOR_CLONES
-static void gather_slab(pliant_body *body, int32_t z, pliant_scratch *scratch)
+static void gather_slab(pliant_body *body, const rigid_field *whole, int32_t z,
+                        pliant_scratch *scratch)
 {
-    gather_bars(body, z, scratch);
+    gather_bars(body, whole, z, scratch);
     gather_plates(body, z, scratch);
-    gather_restricted(body, z, scratch);
-    gather_listed(body, z);
+    gather_restricted(body, whole, z, scratch);
+    gather_listed(body, whole, z);
 }
 
 // ---- Regions ----
@@ -641,46 +678,66 @@ PLIANT_INLINE void leave_out(const pliant_body *body, int32_t z, pliant_scratch 
     }
 }
 
-// v += k (mean of a + (mean of omega) cross x - v)
-PLIANT_INLINE void blend(pliant_body *body, int32_t z, float k, pliant_scratch *scratch)
+// u = v - whole goes by k of the way to mean of a + (mean of omega) cross x. What momenta are left
+// to u is added up on the way: ALL_V and ALL_SPIN of the slab's sums.
+PLIANT_INLINE void blend(const damp_task *task, int32_t z, pliant_scratch *scratch)
 {
+    pliant_body *body = task->body;
     const pliant_lattice *lattice = body->lattice;
     const size_t length = pliant_row_length(lattice->row_blocks);
+    pliant_f8 momentum[3] = {{0}}, spin[3] = {{0}};
     for (int32_t b = lattice->slab_first[z]; b < lattice->slab_first[z + 1]; b++) {
         const int32_t *place = lattice->block_place + 3 * (size_t)b;
         const pliant_particle_constants *constants =
             &body->particle_constants[body->particle_constants_of[b]];
         const pliant_f8 inverse = pliant_f8_load(constants->inverse_size);
-        const pliant_f8 part = pliant_f8_all(k) * pliant_f8_load(constants->is_particle);
+        const pliant_f8 is_particle = pliant_f8_load(constants->is_particle);
+        const pliant_f8 mass = pliant_f8_load(lattice->lane_mass + (size_t)b * PLIANT_LANES);
         const float *mean =
             mean_rows(lattice, scratch, place[1], z) + PLIANT_ROW_PAD + 8 * place[0];
         const float *xs = body->x + (size_t)b * 3 * PLIANT_LANES;
         float *vs = body->v + (size_t)b * 3 * PLIANT_LANES;
-        pliant_f8 x[3], omega[3];
+        pliant_f8 x[3], omega[3], whole[3], u[3];
         for (int c = 0; c < 3; c++) {
             x[c] = pliant_f8_load(xs + 8 * c) - pliant_f8_all(body->origin[c]);
             omega[c] = pliant_f8_load(mean + (TURN_OMEGA + c) * length);
         }
+        evaluate(&task->field, x, whole);
         for (int c = 0; c < 3; c++) {
             const int d = (c + 1) % 3, e = (c + 2) % 3;
-            const pliant_f8 v = pliant_f8_load(vs + 8 * c);
+            const pliant_f8 before = pliant_f8_load(vs + 8 * c) - whole[c];
             const pliant_f8 rigid = inverse * (pliant_f8_load(mean + (TURN_A + c) * length) +
                                                (omega[d] * x[e] - omega[e] * x[d]));
-            pliant_f8_store(vs + 8 * c, v + part * (rigid - v));
+            u[c] = before + pliant_f8_all(task->k) * (rigid - before);
+            pliant_f8_store(vs + 8 * c, is_particle * (whole[c] + u[c]));
+            momentum[c] += mass * u[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            const int d = (c + 1) % 3, e = (c + 2) % 3;
+            spin[c] += mass * (x[d] * u[e] - x[e] * u[d]);
+        }
+    }
+    double *sums = body->slab_sums + (size_t)z * ALL_COUNT;
+    for (int c = 0; c < 3; c++) {
+        sums[ALL_V + c] = sums[ALL_SPIN + c] = 0;
+        for (int k = 0; k < PLIANT_LANES; k++) {
+            sums[ALL_V + c] += (double)momentum[c][k];
+            sums[ALL_SPIN + c] += (double)spin[c][k];
         }
     }
 }
 
 PLIANT_VECTOR_CLONES
-static void spread_slab(pliant_body *body, int32_t z, float k, pliant_scratch *scratch)
+static void spread_slab(const damp_task *task, int32_t z, pliant_scratch *scratch)
 {
+    pliant_body *body = task->body;
     if (body->lattice->slab_first[z] == body->lattice->slab_first[z + 1]) return;
     spread_plates(body, z, scratch);
     spread_restricted(body, z, 1, scratch);
     spread_bars(body, z, scratch);
     spread_restricted(body, z, 0, scratch);
     leave_out(body, z, scratch);
-    blend(body, z, k, scratch);
+    blend(task, z, scratch);
 }
 
 // ---- Damping ----
@@ -688,7 +745,7 @@ static void spread_slab(pliant_body *body, int32_t z, float k, pliant_scratch *s
 static void gather_task(void *context, int32_t z, int32_t worker)
 {
     const damp_task *task = context;
-    gather_slab(task->body, z, &task->body->scratch[worker]);
+    gather_slab(task->body, &task->field, z, &task->body->scratch[worker]);
 }
 
 static void fit_task(void *context, int32_t column, int32_t worker)
@@ -700,52 +757,43 @@ static void fit_task(void *context, int32_t column, int32_t worker)
 static void spread_task(void *context, int32_t z, int32_t worker)
 {
     const damp_task *task = context;
-    spread_slab(task->body, z, task->k, &task->body->scratch[worker]);
+    spread_slab(task, z, &task->body->scratch[worker]);
 }
 
 static void subtract_task(void *context, int32_t z, int32_t worker)
 {
     (void)worker;
     const damp_task *task = context;
-    blend_slab(task->body, z, &task->whole, 1, -1);
-}
-
-static void add_task(void *context, int32_t z, int32_t worker)
-{
-    (void)worker;
-    const damp_task *task = context;
-    blend_slab(task->body, z, &task->whole, 1, 1);
+    blend_slab(task->body, z, &task->field, 1, -1);
 }
 
 static void rigid_task(void *context, int32_t z, int32_t worker)
 {
     (void)worker;
     const damp_task *task = context;
-    blend_slab(task->body, z, &task->whole, 1 - task->k, task->k);
+    blend_slab(task->body, z, &task->field, 1 - task->k, task->k);
 }
 
 void pliant_body_damp(pliant_body *body, float k)
 {
     const pliant_lattice *lattice = body->lattice;
     damp_task task = {.body = body, .k = k};
-    task.whole = measure_whole(&task);
-    pliant_team_run(body->team, lattice->dims[2], subtract_task, &task);
+    measure_whole(&task);
     pliant_team_run(body->team, lattice->dims[2], gather_task, &task);
     pliant_team_run(body->team, lattice->column_count, fit_task, &task);
     pliant_team_run(body->team, lattice->dims[2], spread_task, &task);
-    // What is left has no momenta but those of rounding: they go, and the whole's motion comes
-    // back.
-    const rigid_motion dust = measure_whole(&task);
-    for (int c = 0; c < 3; c++) {
-        task.whole.velocity[c] -= dust.velocity[c];
-        task.whole.omega[c] -= dust.omega[c];
-    }
-    pliant_team_run(body->team, lattice->dims[2], add_task, &task);
+    // Beyond the motion of the whole there were no momenta: what there is now is rounding, and
+    // goes.
+    double sums[ALL_COUNT];
+    add_slabs(body, sums);
+    task.whole = fit_whole(sums);
+    task.field = field_of(&task.whole);
+    pliant_team_run(body->team, lattice->dims[2], subtract_task, &task);
 }
 
 void pliant_body_damp_rigid(pliant_body *body, float k)
 {
     damp_task task = {.body = body, .k = k};
-    task.whole = measure_whole(&task);
+    measure_whole(&task);
     pliant_team_run(body->team, body->lattice->dims[2], rigid_task, &task);
 }
