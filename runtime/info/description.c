@@ -1,6 +1,7 @@
 // description.c: the description of a file for people.
 #include "description.h"
 
+#include "lattice_facts.h"
 #include "pliant/mesh.h"
 #include "pliant/utf8.h"
 #include "pliant/wavelet.h"
@@ -189,7 +190,9 @@ static void print_provenance(const pliant_contents *contents, FILE *stream)
 void pliant_description_print_verified(const pliant_contents *contents, const pliant_definiteness *verified,
                                        FILE *stream)
 {
-    const char *looked_at = contents->kind == PLIANT_CONTENTS_MODEL   ? ", indices and levels"
+    const int has_lattice = contents->model.lattice_cell_count > 0;
+    const char *looked_at = has_lattice                               ? ", indices, levels and lattice"
+                            : contents->kind == PLIANT_CONTENTS_MODEL ? ", indices and levels"
                             : contents->kind == PLIANT_CONTENTS_DENSE ? " and indices"
                                                                       : "";
     fprintf(stream, "verified: %" PRId32 " sections, %" PRIu64 " bytes: checksums%s\n",
@@ -222,6 +225,7 @@ void pliant_description_print(const pliant_contents *contents, FILE *stream)
     if (contents->kind == PLIANT_CONTENTS_MODEL) {
         print_mesh(&contents->model, stream);
         print_detail(&contents->model, stream);
+        pliant_lattice_facts_print(&contents->model, stream);
         print_greens(&contents->model, stream);
     } else if (contents->kind == PLIANT_CONTENTS_DENSE) {
         print_dense(&contents->dense, stream);

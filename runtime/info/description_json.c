@@ -1,6 +1,7 @@
 // description_json.c: the description of a file as JSON (RFC 8259).
 #include "description.h"
 
+#include "lattice_facts.h"
 #include "pliant/utf8.h"
 #include "pliant/wavelet.h"
 
@@ -203,6 +204,7 @@ void pliant_description_print_json(const pliant_contents *contents, const pliant
     if (contents->kind == PLIANT_CONTENTS_MODEL) {
         print_mesh(&contents->model, stream);
         print_detail(&contents->model, stream);
+        pliant_lattice_facts_print_json(&contents->model, stream);
         print_greens(&contents->model, verified, stream);
     } else if (contents->kind == PLIANT_CONTENTS_DENSE) {
         fprintf(stream, ",\n  \"domains\": {\"free\": %d, \"fixed\": %d}",

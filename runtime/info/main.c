@@ -1,6 +1,7 @@
 // main.c: pliant-info, what is in a model file, is it sound, and its mesh for other programs.
 #include "contents.h"
 #include "description.h"
+#include "lattice_facts.h"
 #include "mesh_export.h"
 #include "options.h"
 
@@ -26,7 +27,8 @@ static int run(const pliant_info_options *options)
     pliant_definiteness definiteness = {.levels = {{.steps = 0}}};
     if (options->verify && pliant_contents_verify(&contents, &err) < 0) status = EXIT_FAILED;
     if (options->verify && status == EXIT_DONE && contents.kind == PLIANT_CONTENTS_MODEL &&
-        pliant_definiteness_measure(&contents, &definiteness, &err) < 0)
+        (pliant_lattice_facts_verify(&contents, &err) < 0 ||
+         pliant_definiteness_measure(&contents, &definiteness, &err) < 0))
         status = EXIT_FAILED;
     if (status == EXIT_DONE && options->output) {
         const pliant_status done =

@@ -363,6 +363,78 @@ static void detail_is_described_and_exported(void **state)
     assert_false(exists(scratch("none.obj")));
 }
 
+// Alone in its file, or beside Green's functions.
+static void lattice_is_described_and_exported(void **state)
+{
+    (void)state;
+    static const char *const shown[] = {
+        "lattice     35 particles (5 x 3 x 3), 9 cells of size 1, solid, 2 components\n",
+        "            half-width 1, ", " regions, 13 irregular by ",
+        "            mass 8, of a particle 0.228571 to 0.228571\n",
+        "            surface in 2 batches of at most 27 particles\n",
+        "material    Young's modulus 1000",
+    };
+    for (int parts = TINY_LATTICE; parts <= (TINY_LATTICE | TINY_NO_GREENS); parts += TINY_NO_GREENS) {
+        const int has_greens = !(parts & TINY_NO_GREENS);
+        const char *path = write_model("lattice.h5", 3, parts);
+        const answer *a = ask_about("", path);
+        check_answer(a, 0, ": Pliant model, format version 1, ");
+        for (size_t i = 0; i < sizeof shown / sizeof *shown; i++) check_contains(a->text, shown[i]);
+        assert_int_equal(strstr(a->text, "domains") != NULL, has_greens);
+        assert_int_equal(strstr(a->text, "greens") != NULL, has_greens);
+        assert_int_equal(strstr(a->text, "gravity") != NULL, has_greens);
+        a = ask_about("--json", path);
+        check_json(a->text);
+        check_contains(a->text, "\"lattice\": {\"particles\": 35, \"cells\": 9, \"dims\": [5, 3, 3], "
+                                "\"cell_size\": 1, \"origin\": [-1, -1, -1]");
+        check_contains(a->text, "\"shell\": false, \"components\": 2, \"half_width\": 1, ");
+        check_contains(a->text, "\"irregular\": 13, ");
+        check_contains(a->text, "\"batches\": 2, \"largest_batch\": 27}");
+        assert_int_equal(strstr(a->text, "\"domains\"") != NULL, has_greens);
+        check_answer(ask_about("--verify", path), 0, "checksums, indices, levels and lattice\n");
+        char arguments[1500];
+        const char *output = scratch("lattice.ply");
+        snprintf(arguments, sizeof arguments, "--export '%s' --level 1 '%s'", output, path);
+        check_answer(ask(arguments), 0, "");
+        assert_true(exists(output));
+    }
+}
+
+// What binding takes, since it does no harm, but is not so.
+static void wrong_lattices_are_found_by_verify(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *path;
+        int32_t element;
+        double value;
+        const char *reason;
+    } cases[] = {
+        {"/lattice/summary", PLIANT_LATTICE_COMPONENT_COUNT, 1, "/lattice/summary: components: expected 2, found 1"},
+        {"/lattice/frame", PLIANT_LATTICE_MASS, 7.9, "/lattice/mass: expected a sum of 7.9, found 8"},
+        {"/lattice/frame", 0, -1.1, "/lattice/vertex_offset: element 0: expected a vertex at 1, found 0.9"},
+        {"/lattice/vertex_cell", 0, 0, "/lattice/vertex_offset: element 0: expected a vertex at 1, found 0"},
+        {"/lattice/region_size", 7, 26, "/lattice/region_size: element 7: expected "},
+        {"/lattice/region_nodes", 2, -2, "/lattice/region_nodes: row 0: expected what particle 2 reaches"},
+        {"/lattice/plate_nodes", 4, 1, "/lattice/region_nodes: row "},
+        {"/lattice/batch_points", 29, 3, "/lattice/batch_points: batch 1: expected particle "},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        pliant_error err;
+        tiny_file file;
+        const char *path = scratch("wrong.h5");
+        tiny_model_make(3, TINY_LATTICE | TINY_NO_GREENS, &file);
+        tiny_section *s = tiny_find(&file, cases[i].path);
+        if (s->def.type == PLIANT_F8) ((double *)s->data)[cases[i].element] = cases[i].value;
+        else ((int32_t *)s->data)[cases[i].element] = (int32_t)cases[i].value;
+        check_ok(tiny_write(&file, path, &err), &err);
+        tiny_free(&file);
+        check_answer(ask_about("", path), 0, "Pliant model");
+        if (ask_about("--verify", path)->status != 1) fail_msg("%s: passed", cases[i].path);
+        check_answer(ask_about("--verify", path), 1, cases[i].reason);
+    }
+}
+
 static void exports_that_cannot_be_written_leave_nothing(void **state)
 {
     (void)state;
@@ -434,6 +506,8 @@ int main(void)
         cmocka_unit_test(wrong_topology_is_found_by_verify),
         cmocka_unit_test(levels_are_exported_as_obj_and_ply),
         cmocka_unit_test(detail_is_described_and_exported),
+        cmocka_unit_test(lattice_is_described_and_exported),
+        cmocka_unit_test(wrong_lattices_are_found_by_verify),
         cmocka_unit_test(exports_that_cannot_be_written_leave_nothing),
         cmocka_unit_test(misuse_exits_with_2_and_failure_with_1),
         cmocka_unit_test(lost_output_is_noticed),
