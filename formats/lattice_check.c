@@ -13,6 +13,10 @@
 // How far stored tangents may be from orthonormal; floats keep 1e-7.
 #define TANGENT_TOLERANCE 1e-3f
 
+// On line, squares of lengths and their inverses are floats.
+#define CELL_SIZE_LEAST 1e-9
+#define CELL_SIZE_MOST  1e9
+
 typedef struct check {
     const char *name;
     const pliant_model_view *view;
@@ -44,6 +48,10 @@ static pliant_status check_frame(const check *c, pliant_error *err)
         if (!isfinite(x[i])) return refuse(c, "frame", i, "a finite number", x[i], err);
     for (int i = PLIANT_LATTICE_CELL_SIZE; i <= PLIANT_LATTICE_MASS; i++)
         if (!(x[i] > 0)) return refuse(c, "frame", i, "a number above 0", x[i], err);
+    if (x[PLIANT_LATTICE_CELL_SIZE] < CELL_SIZE_LEAST ||
+        x[PLIANT_LATTICE_CELL_SIZE] > CELL_SIZE_MOST)
+        return refuse(c, "frame", PLIANT_LATTICE_CELL_SIZE, "1e-9 to 1e9",
+                      x[PLIANT_LATTICE_CELL_SIZE], err);
     // On line, positions are floats.
     for (int i = 0; i < 3; i++) {
         const double last = x[i] + PLIANT_LATTICE_DIM_LIMIT * x[PLIANT_LATTICE_CELL_SIZE];
@@ -232,8 +240,8 @@ static pliant_status check_mask(const check *c, const int32_t *node, int32_t d, 
     if (members != 0 && (is_whole ? members == there : (members & ~there) == 0)) return PLIANT_OK;
     return pliant_error_set(err, PLIANT_ERR_FORMAT,
                             "%s: /lattice/plate_nodes: element %lld: expected %s of %#x, found %#x",
-                            c->name, (long long)element, is_whole ? "all" : "some",
-                            (unsigned)there, (unsigned)mask);
+                            c->name, (long long)element, is_whole ? "all" : "some", (unsigned)there,
+                            (unsigned)mask);
 }
 
 static pliant_status check_plates(const check *c, pliant_error *err)

@@ -1,6 +1,7 @@
 // lattice.c: one lattice with one half-width, laid out for the step.
 #include "lattice/lattice.h"
 
+#include "lattice/surface.h"
 #include "model.h"
 #include "pliant/error.h"
 
@@ -572,6 +573,7 @@ void pliant_lattice_destroy(pliant_lattice *lattice)
     pliant_arena_release(&lattice->items_arena);
     pliant_arena_release(&lattice->irregular_arena);
     pliant_links_destroy(lattice->links);
+    pliant_surface_detach(lattice);
     free(lattice);
 }
 
@@ -636,10 +638,15 @@ pliant_status pliant_lattice_create(const pliant_model *model, int32_t half_widt
     pliant_regions *found = NULL, stored;
     pliant_status status = find_regions(view, &def.shape, half_width, &found, &stored, &reason);
     def.regions = found ? found : &stored;
-    if (status >= 0) status = pliant_lattice_build(&def, result, &reason);
+    pliant_lattice *lattice = NULL;
+    if (status >= 0) status = pliant_lattice_build(&def, &lattice, &reason);
     pliant_regions_destroy(found);
-    if (status < 0) return pliant_error_set(err, status, "%s: %.400s", name, reason.text);
-    (*result)->model = model;
+    if (status >= 0) status = pliant_surface_attach(lattice, model, &reason);
+    if (status < 0) {
+        pliant_lattice_destroy(lattice);
+        return pliant_error_set(err, status, "%s: %.400s", name, reason.text);
+    }
+    *result = lattice;
     return PLIANT_OK;
 }
 
@@ -647,6 +654,7 @@ pliant_status pliant_lattice_create(const pliant_model *model, int32_t half_widt
 
 pliant_lattice_info pliant_lattice_describe(const pliant_lattice *lattice)
 {
+    const pliant_model_view *view = lattice->model ? &lattice->model->view : NULL;
     return (pliant_lattice_info){
         .particle_count = lattice->particle_count,
         .cell_count = lattice->cell_count,
@@ -656,6 +664,9 @@ pliant_lattice_info pliant_lattice_describe(const pliant_lattice *lattice)
         .irregular_count = lattice->irregular_count,
         .is_shell = lattice->is_shell,
         .dims = {lattice->dims[0], lattice->dims[1], lattice->dims[2]},
+        .vertex_count = view ? view->vertex_count : 0,
+        .face_count = view ? view->face_count : 0,
+        .batch_count = view ? view->lattice_batch_count : 0,
         .cell_size = (double)lattice->cell_size,
         .mass = lattice->mass,
     };

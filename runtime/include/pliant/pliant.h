@@ -544,7 +544,9 @@ typedef struct pliant_lattice_info {
     int32_t irregular_count;  // regions that are not all particles of their (2w + 1)^3 window
     int32_t is_shell;         // 1: cells that the surface touches; 0: what it encloses too
     int32_t dims[3];          // particles along x, y, z
-    double cell_size, mass;   // m, kg
+    // Of the embedded surface: the model's finest level, and its batches.
+    int32_t vertex_count, face_count, batch_count;
+    double cell_size, mass;  // m, kg
 } pliant_lattice_info;
 PLIANT_API pliant_lattice_info pliant_lattice_describe(const pliant_lattice *lattice);
 // Rest positions, shape [particle_count][3], m; borrowed until destroy.
@@ -608,3 +610,40 @@ typedef struct pliant_body_motion {
     double kinetic_energy;       // J
 } pliant_body_motion;
 PLIANT_API pliant_body_motion pliant_body_measure(const pliant_body *body);
+
+// ---- The surface of a lattice body ----
+//
+// The model's finest level is embedded: vertex X lies in a cell of the rest lattice and moves with
+// its eight corners. Its normal is that of the deformed surface, from two tangents U, V at rest:
+//
+//     x = sum of a_i x_i     u = sum of b_i x_i     v = sum of c_i x_i     n = u x v / |u x v|
+//
+// over the corners i, with a_i = phi_i(X), b_i = U . grad phi_i(X), c_i = V . grad phi_i(X)
+// (LSM-15..17). The faces are the model's (pliant_model_faces).
+
+// Where the body's surface is, shape [vertex_count] each, m; either may be NULL. Normals are unit
+// vectors; where the surface has lost its extent, so that it has none, the one at rest. About 5 ns
+// a vertex. Allocates nothing; threads may ask for one body at once while nothing changes it.
+// PLIANT_ERR_MISSING: the lattice has no surface.
+PLIANT_CALL pliant_status pliant_body_surface(const pliant_body *body, pliant_vec3 *positions,
+                                              pliant_vec3 *normals);
+
+// For shaders that do the above: what a vertex goes with.
+typedef struct pliant_vertex_weights {
+    int32_t particle[8];  // corner k of the cell: + (k & 1, k >> 1 & 1, k >> 2)
+    float position[8];    // a_i
+    float u[8], v[8];     // b_i, c_i, 1/m
+} pliant_vertex_weights;
+PLIANT_CALL pliant_status pliant_lattice_vertex(const pliant_lattice *lattice, int32_t vertex,
+                                                pliant_vertex_weights *weights);
+
+// A part of the faces whose vertices go with few particles, so that a shader can hold the positions
+// of all. Every face is in one batch.
+#define PLIANT_BATCH_PARTICLES 128
+typedef struct pliant_lattice_batch {
+    int32_t face_count, particle_count;  // particle_count is at most PLIANT_BATCH_PARTICLES
+    const int32_t *faces;                // shape [face_count]; borrowed until the model is closed
+    const int32_t *particles;            // shape [particle_count], ascending; likewise
+} pliant_lattice_batch;
+PLIANT_CALL pliant_status pliant_lattice_find_batch(const pliant_lattice *lattice, int32_t batch,
+                                                    pliant_lattice_batch *found);
