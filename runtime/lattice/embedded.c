@@ -1,8 +1,9 @@
 // embedded.c: the surface that a lattice carries.
 //
-// Four vertices go side by side, three numbers and a spare each: what four vertices need then comes
-// from memory as it lies there, whether they share a cell or not. (Lanes across the vertices of one
-// cell were counted and lost: few cells hold eight.)
+// Two vertices go side by side, three numbers and a spare each: what a vertex needs then comes from
+// memory as it lies there, whether the two share a cell or not. Tried and lost: lanes across the
+// vertices of one cell (few cells hold eight); four side by side (80 ns a vertex instead of 8 with
+// AVX2, because gcc 12 shuffles vectors that the machine has not number by number).
 #include "lattice/embedded.h"
 
 #include "lattice/lattice.h"
@@ -22,9 +23,9 @@ static void lay_out(pliant_arena *arena, pliant_embedded *e)
     PLIANT_TAKE(arena, e->corner_slot, 8 * (size_t)e->cell_count);
     PLIANT_TAKE(arena, e->first_vertex, e->cell_count + 1);
     PLIANT_TAKE(arena, e->vertex, e->vertex_count);
-    // A group of four is read whole.
-    PLIANT_TAKE(arena, e->offset, 4 * ((size_t)e->vertex_count + 3));
-    PLIANT_TAKE(arena, e->normal, 4 * ((size_t)e->vertex_count + 3));
+    // A group of two is read whole.
+    PLIANT_TAKE(arena, e->offset, 4 * ((size_t)e->vertex_count + 1));
+    PLIANT_TAKE(arena, e->normal, 4 * ((size_t)e->vertex_count + 1));
 }
 
 static void place_vertex(const pliant_embedded_def *def, int32_t vertex, int32_t at,
@@ -93,10 +94,9 @@ void pliant_embedded_destroy(pliant_embedded *embedded)
 // ---- Evaluation ----
 
 typedef float row4 __attribute__((vector_size(16)));
-typedef float row8 __attribute__((vector_size(32)));
-typedef float row16 __attribute__((vector_size(64)));  // four vertices: x, y, z, 0
-typedef int32_t bits16 __attribute__((vector_size(64)));
-typedef float packed16 __attribute__((vector_size(64), aligned(16), may_alias));
+typedef float row8 __attribute__((vector_size(32)));  // two vertices: x, y, z, 0
+typedef int32_t bits8 __attribute__((vector_size(32)));
+typedef float packed8 __attribute__((vector_size(32), aligned(16), may_alias));
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -128,68 +128,62 @@ INLINE void find_polynomial(const float *x, const int32_t *slots, cell_polynomia
     p->c[7] = (r_st - r_t) - (r_s - r);
 }
 
-// Component `c` of each vertex, three times.
+// Component `c` of each vertex, in all its places.
 #define SPREAD(a, c)                                                                               \
-    __builtin_shufflevector((a), (a), (c), (c), (c), (c), 4 + (c), 4 + (c), 4 + (c), 4 + (c),      \
-                            8 + (c), 8 + (c), 8 + (c), 8 + (c), 12 + (c), 12 + (c), 12 + (c),      \
-                            12 + (c))
+    __builtin_shufflevector((a), (a), (c), (c), (c), (c), 4 + (c), 4 + (c), 4 + (c), 4 + (c))
 // (y, z, x) of each vertex.
-#define TURN(a)                                                                                    \
-    __builtin_shufflevector((a), (a), 1, 2, 0, 3, 5, 6, 4, 7, 9, 10, 8, 11, 13, 14, 12, 15)
-
-#define JOIN4(a, b) __builtin_shufflevector((a), (b), 0, 1, 2, 3, 4, 5, 6, 7)
-#define JOIN8(a, b)                                                                                \
-    __builtin_shufflevector((a), (b), 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#define TURN(a)    __builtin_shufflevector((a), (a), 1, 2, 0, 3, 5, 6, 4, 7)
+#define JOIN(a, b) __builtin_shufflevector((a), (b), 0, 1, 2, 3, 4, 5, 6, 7)
 
 // 1 / sqrt(a), to about two units in the last place: see polar_block.h.
-INLINE void find_inverse_root(const row16 *a, row16 *result)
+INLINE void find_inverse_root(const row8 *a, row8 *result)
 {
-    const row16 half = 0.5f * *a;
-    row16 y = (row16)(0x5F375A86 - ((bits16)*a >> 1));
+    const row8 half = 0.5f * *a;
+    row8 y = (row8)(0x5F375A86 - ((bits8)*a >> 1));
     for (int step = 0; step < 3; step++) y *= 1.5f - half * y * y;
     *result = y;
 }
 
-INLINE void find_normals(float share, const row16 *normal, const row16 *r, const row16 *s,
-                         const row16 *t, row16 *result)
+INLINE void find_normals(float share, const row8 *normal, const row8 *r, const row8 *s,
+                         const row8 *t, row8 *result)
 {
     // cof(F) N = N_x F_y x F_z + N_y F_z x F_x + N_z F_x x F_y; a cross product is a x (y, z, x) of
     // b less the opposite, turned once more.
-    const row16 r_turned = TURN(*r), s_turned = TURN(*s), t_turned = TURN(*t);
-    const row16 sum = SPREAD(*normal, 0) * (*s * t_turned - s_turned * *t) +
-                      SPREAD(*normal, 1) * (*t * r_turned - t_turned * *r) +
-                      SPREAD(*normal, 2) * (*r * s_turned - r_turned * *s);
-    const row16 n = TURN(sum) + share * *normal;
-    const row16 square = n * n, turned = TURN(square);
-    const row16 length = square + turned + TURN(turned);
-    row16 inverse;
+    const row8 r_turned = TURN(*r), s_turned = TURN(*s), t_turned = TURN(*t);
+    const row8 sum = SPREAD(*normal, 0) * (*s * t_turned - s_turned * *t) +
+                     SPREAD(*normal, 1) * (*t * r_turned - t_turned * *r) +
+                     SPREAD(*normal, 2) * (*r * s_turned - r_turned * *s);
+    const row8 n = TURN(sum) + share * *normal;
+    const row8 square = n * n, turned = TURN(square);
+    const row8 length = square + turned + TURN(turned);
+    row8 inverse;
     find_inverse_root(&length, &inverse);
     *result = n * inverse;
 }
 
-INLINE void store(const row16 *rows, const int32_t *vertices, int32_t count, pliant_vec3 *to)
+INLINE void store(const row8 *rows, const int32_t *vertices, int32_t count, pliant_vec3 *to)
 {
     const float *from = (const float *)rows;
     for (int32_t k = 0; k < count; k++)
         to[vertices[k]] = (pliant_vec3){from[4 * k], from[4 * k + 1], from[4 * k + 2]};
 }
 
-// Four vertices from place `at` on, of which `count` are wanted.
-INLINE void evaluate_group(const pliant_embedded *e, const row16 c[8], int32_t at, int32_t count,
+// Two vertices from place `at` on, of which `count` are wanted.
+INLINE void evaluate_group(const pliant_embedded *e, const row8 c[8], int32_t at, int32_t count,
                            pliant_vec3 *positions, pliant_vec3 *normals)
 {
-    const row16 offset = *(const packed16 *)(e->offset + 4 * (size_t)at);
-    const row16 r = SPREAD(offset, 0), s = SPREAD(offset, 1), t = SPREAD(offset, 2);
-    const row16 dr = c[1] + s * c[3] + t * (c[5] + s * c[7]);
+    const row8 offset = *(const packed8 *)(e->offset + 4 * (size_t)at);
+    const row8 r = SPREAD(offset, 0), s = SPREAD(offset, 1), t = SPREAD(offset, 2);
+    const row8 dr = c[1] + s * c[3] + t * (c[5] + s * c[7]);
     if (positions) {
-        const row16 x = c[0] + s * c[2] + t * (c[4] + s * c[6]) + r * dr;
+        const row8 x = c[0] + s * c[2] + t * (c[4] + s * c[6]) + r * dr;
         store(&x, e->vertex + at, count, positions);
     }
     if (normals) {
-        const row16 normal = *(const packed16 *)(e->normal + 4 * (size_t)at);
-        const row16 ds = c[2] + r * c[3] + t * (c[6] + r * c[7]);
-        const row16 dt = c[4] + r * c[5] + s * (c[6] + r * c[7]);
-        row16 n;
+        const row8 normal = *(const packed8 *)(e->normal + 4 * (size_t)at);
+        const row8 ds = c[2] + r * c[3] + t * (c[6] + r * c[7]);
+        const row8 dt = c[4] + r * c[5] + s * (c[6] + r * c[7]);
+        row8 n;
         find_normals(e->rest_share, &normal, &dr, &ds, &dt, &n);
         store(&n, e->vertex + at, count, normals);
     }
@@ -206,29 +200,25 @@ INLINE int32_t find_cell(const pliant_embedded *e, int32_t place)
     return low;
 }
 
-// Four vertices may lie in four cells, and the next four begin in the last of them.
+// Two vertices lie in one cell or in two, and the next two begin in the last or after it.
 INLINE void evaluate(const pliant_embedded *e, const float *x, int32_t first, int32_t last,
                      pliant_vec3 *positions, pliant_vec3 *normals)
 {
-    cell_polynomial cells[4];
+    cell_polynomial cells[2];
     int32_t cell = find_cell(e, first);
-    find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 4]);
-    for (int32_t at = first; at < last; at += 4) {
-        const int32_t count = last - at < 4 ? last - at : 4;
-        const cell_polynomial *of[4];
-        row16 c[8];
-        for (int32_t k = 0; k < 4; k++) {
+    find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 2]);
+    for (int32_t at = first; at < last; at += 2) {
+        const int32_t count = last - at < 2 ? 1 : 2;
+        const cell_polynomial *of[2];
+        row8 c[8];
+        for (int32_t k = 0; k < 2; k++) {
             if (k < count && at + k >= e->first_vertex[cell + 1]) {
                 cell++;
-                find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 4]);
+                find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 2]);
             }
-            of[k] = &cells[cell % 4];
+            of[k] = &cells[cell % 2];
         }
-        for (int j = 0; j < 8; j++) {
-            const row8 low = JOIN4(of[0]->c[j], of[1]->c[j]),
-                       high = JOIN4(of[2]->c[j], of[3]->c[j]);
-            c[j] = JOIN8(low, high);
-        }
+        for (int j = 0; j < 8; j++) c[j] = JOIN(of[0]->c[j], of[1]->c[j]);
         evaluate_group(e, c, at, count, positions, normals);
     }
 }

@@ -38,13 +38,13 @@ static void check_positions(const check_lattice *l)
 static void lattices_of_any_cells_open_and_hold_a_closed_surface(void **state)
 {
     (void)state;
-    static const int32_t widths[] = {1, 2, 5, 15};
+    static const int32_t widths[] = {1, 2, 5, 15}, sizes[] = {5, 12, 6, 3};
     pliant_error err = {""};
     for (check_cells shape = 0; shape < CHECK_CELLS_SHAPES; shape++)
         for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
             check_lattice *l = check_lattice_create(
                 &(check_lattice_def){.shape = shape,
-                                     .size = 5,
+                                     .size = sizes[i],
                                      .half_width = widths[i],
                                      .cell_size = 0.5,
                                      .origin = {1, -2, 3},

@@ -95,8 +95,10 @@ static void join(int32_t *parent, int32_t a, int32_t b)
     parent[a > b ? a : b] = a > b ? b : a;
 }
 
-// Two quads meet at an edge, or four where two cells touch along it: then each cell's own two.
-static int32_t *join_corners(int32_t quad_count, const quad *quads)
+// Two quads meet at an edge, or four where two cells touch along it: then each cell's own two, and
+// `mate` of either's side is the other's, else -1. (The surface may come together again around both
+// ends of such an edge; a vertex in the middle of each pair's keeps those apart.)
+static int32_t *join_corners(int32_t quad_count, const quad *quads, int32_t *mate)
 {
     const size_t count = 4 * (size_t)quad_count;
     edge *edges = take(count, sizeof *edges);
@@ -112,6 +114,10 @@ static int32_t *join_corners(int32_t quad_count, const quad *quads)
     for (size_t i = 0; i < count; i += 2) {
         const edge *a = &edges[i], *b = &edges[i + 1];
         assert_true(a->key == b->key);
+        const int is_shared =
+            (i > 0 && edges[i - 1].key == a->key) || (i + 2 < count && edges[i + 2].key == a->key);
+        mate[4 * a->quad + a->side] = is_shared ? 4 * b->quad + b->side : -1;
+        mate[4 * b->quad + b->side] = is_shared ? 4 * a->quad + a->side : -1;
         join(parent, 4 * a->quad + a->side, 4 * b->quad + (b->side + 1) % 4);
         join(parent, 4 * b->quad + b->side, 4 * a->quad + (a->side + 1) % 4);
     }
@@ -128,47 +134,92 @@ static int is_inside(const double *x, const int32_t *cell)
 
 // ---- The mesh ----
 
-// Where the fans' vertices lie: a corner less `inset` of the sum of the normals' directions, where
-// that is in a cell of the fan.
-static void place_fans(int32_t quad_count, const quad *quads, const int32_t *fan,
-                       const int32_t *cells, double inset, check_cell_surface *s)
+// Numbers of the mesh's vertices: fans of corners, middles of quads, middles of sides.
+typedef struct numbering {
+    int32_t quad_count, fan_count, split_count;
+    int32_t *fan;    // shape [4 quad_count]: of a quad's corner
+    int32_t *split;  // shape [4 quad_count]: of a quad's side, or -1
+} numbering;
+
+static numbering number_vertices(int32_t quad_count, const quad *quads)
 {
-    const int32_t fan_count = s->mesh->vertex_count - quad_count;
-    int32_t(*normal)[3] = take((size_t)fan_count, sizeof *normal);
-    for (int32_t i = 0; i < 4 * quad_count; i++)
-        normal[fan[i]][quads[i / 4].axis] += quads[i / 4].sign;
-    for (int32_t f = 0; f < fan_count; f++) s->cell[f] = -1;
+    const int32_t count = 4 * quad_count;
+    numbering n = {.quad_count = quad_count,
+                   .fan = take((size_t)count, sizeof *n.fan),
+                   .split = take((size_t)count, sizeof *n.split)};
+    int32_t *mate = take((size_t)count, sizeof *mate);
+    int32_t *parent = join_corners(quad_count, quads, mate);
+    // A root is the least corner of its fan, so it has its number before the others ask.
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t root = root_of(parent, i);
+        n.fan[i] = root == i ? n.fan_count++ : n.fan[root];
+    }
+    const int32_t first = n.fan_count + quad_count;
+    for (int32_t i = 0; i < count; i++)
+        n.split[i] = mate[i] < 0 ? -1 : mate[i] < i ? n.split[mate[i]] : first + n.split_count++;
+    free(parent);
+    free(mate);
+    return n;
+}
+
+// A corner less `inset` of the sum of the normals' directions, where that is in a cell of the fan.
+static void place_fans(const numbering *n, const quad *quads, const int32_t *cells, double inset,
+                       check_cell_surface *s)
+{
+    int32_t(*normal)[3] = take((size_t)n->fan_count, sizeof *normal);
+    for (int32_t i = 0; i < 4 * n->quad_count; i++)
+        normal[n->fan[i]][quads[i / 4].axis] += quads[i / 4].sign;
+    for (int32_t f = 0; f < n->fan_count; f++) s->cell[f] = -1;
     for (int pass = 0; pass < 2; pass++)  // the second: those that had to stay at their corner
-        for (int32_t i = 0; i < 4 * quad_count; i++) {
+        for (int32_t i = 0; i < 4 * n->quad_count; i++) {
             const quad *q = &quads[i / 4];
+            const int32_t fan = n->fan[i];
             double x[3];
-            if (s->cell[fan[i]] >= 0) continue;
+            if (s->cell[fan] >= 0) continue;
             for (int d = 0; d < 3; d++) {
-                const int32_t n = normal[fan[i]][d], direction = (n > 0) - (n < 0);
+                const int32_t sum = normal[fan][d], direction = (sum > 0) - (sum < 0);
                 x[d] = q->corner[i % 4][d] - (pass == 0 ? inset * direction : 0);
             }
             if (!is_inside(x, cells + 3 * (size_t)q->cell)) continue;
-            s->cell[fan[i]] = q->cell;
-            memcpy(s->mesh->vertices + 3 * (size_t)fan[i], x, sizeof x);
+            s->cell[fan] = q->cell;
+            memcpy(s->mesh->vertices + 3 * (size_t)fan, x, sizeof x);
         }
     free(normal);
 }
 
-static void add_quads(int32_t quad_count, const quad *quads, const int32_t *fan, double inset,
-                      check_cell_surface *s)
+// The middles of quads, and of sides that two cells share: each of a side's two quads gives
+// half of where that is, and its inset.
+static void place_middles(const numbering *n, const quad *quads, double inset,
+                          check_cell_surface *s)
 {
-    const int32_t fan_count = s->mesh->vertex_count - quad_count;
-    for (int32_t q = 0; q < quad_count; q++) {
-        const int32_t middle = fan_count + q;
+    for (int32_t q = 0; q < n->quad_count; q++) {
+        const int32_t middle = n->fan_count + q;
         double *x = s->mesh->vertices + 3 * (size_t)middle;
         for (int d = 0; d < 3; d++)
             for (int k = 0; k < 4; k++) x[d] += 0.25 * quads[q].corner[k][d];
         x[quads[q].axis] -= inset * quads[q].sign;
         s->cell[middle] = quads[q].cell;
         for (int k = 0; k < 4; k++) {
-            int32_t *face = s->mesh->faces + 3 * (4 * (size_t)q + (size_t)k);
-            face[0] = fan[4 * q + k];
-            face[1] = fan[4 * q + (k + 1) % 4];
+            const int32_t split = n->split[4 * q + k];
+            if (split < 0) continue;
+            double *y = s->mesh->vertices + 3 * (size_t)split;
+            for (int d = 0; d < 3; d++)
+                y[d] += 0.25 * (quads[q].corner[k][d] + quads[q].corner[(k + 1) % 4][d]);
+            y[quads[q].axis] -= inset * quads[q].sign;
+            s->cell[split] = quads[q].cell;
+        }
+    }
+}
+
+static void add_faces(const numbering *n, check_cell_surface *s)
+{
+    int32_t *face = s->mesh->faces;
+    for (int32_t i = 0; i < 4 * n->quad_count; i++) {
+        const int32_t middle = n->fan_count + i / 4, split = n->split[i];
+        const int32_t ends[2] = {n->fan[i], n->fan[i - i % 4 + (i + 1) % 4]};
+        for (int side = 0; side < (split < 0 ? 1 : 2); side++, face += 3) {
+            face[0] = side == 0 ? ends[0] : split;
+            face[1] = split < 0 || side == 1 ? ends[1] : split;
             face[2] = middle;
         }
     }
@@ -178,21 +229,19 @@ check_cell_surface check_cell_surface_create(int32_t cell_count, const int32_t *
 {
     check_cell_surface s = {.mesh = NULL};
     pliant_error err = {""};
-    int32_t quad_count = 0, fan_count = 0;
+    int32_t quad_count = 0;
     quad *quads = find_quads(cell_count, cells, &quad_count);
-    int32_t *parent = join_corners(quad_count, quads);
-    int32_t *fan = take(4 * (size_t)quad_count, sizeof *fan);
-    // A root is the least corner of its fan, so it has its number before the others ask.
-    for (int32_t i = 0; i < 4 * quad_count; i++) {
-        const int32_t root = root_of(parent, i);
-        fan[i] = root == i ? fan_count++ : fan[root];
-    }
-    check_ok(pliant_mesh_create(fan_count + quad_count, 4 * quad_count, &s.mesh, &err), &err);
+    numbering n = number_vertices(quad_count, quads);
+    // Either of the two quads at a split side has a face more for it.
+    check_ok(pliant_mesh_create(n.fan_count + quad_count + n.split_count,
+                                4 * quad_count + 2 * n.split_count, &s.mesh, &err),
+             &err);
     s.cell = take((size_t)s.mesh->vertex_count, sizeof *s.cell);
-    place_fans(quad_count, quads, fan, cells, inset, &s);
-    add_quads(quad_count, quads, fan, inset, &s);
-    free(fan);
-    free(parent);
+    place_fans(&n, quads, cells, inset, &s);
+    place_middles(&n, quads, inset, &s);
+    add_faces(&n, &s);
+    free(n.split);
+    free(n.fan);
     free(quads);
     return s;
 }
