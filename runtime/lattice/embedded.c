@@ -1,9 +1,8 @@
 // embedded.c: the surface that a lattice carries.
 //
-// Two vertices go side by side, three numbers and a spare each: what a vertex needs then comes from
-// memory as it lies there, whether the two share a cell or not. Tried and lost: lanes across the
-// vertices of one cell (few cells hold eight); four side by side (80 ns a vertex instead of 8 with
-// AVX2, because gcc 12 shuffles vectors that the machine has not number by number).
+// Eight vertices of one cell go side by side, or as many as it has. Tried and lost: three numbers
+// and a spare of two vertices side by side, whether they share a cell or not (twice the time with
+// five vertices a cell, three times with twenty-five).
 #include "lattice/embedded.h"
 
 #include "lattice/lattice.h"
@@ -23,9 +22,11 @@ static void lay_out(pliant_arena *arena, pliant_embedded *e)
     PLIANT_TAKE(arena, e->corner_slot, 8 * (size_t)e->cell_count);
     PLIANT_TAKE(arena, e->first_vertex, e->cell_count + 1);
     PLIANT_TAKE(arena, e->vertex, e->vertex_count);
-    // A group of two is read whole.
-    PLIANT_TAKE(arena, e->offset, 4 * ((size_t)e->vertex_count + 1));
-    PLIANT_TAKE(arena, e->normal, 4 * ((size_t)e->vertex_count + 1));
+    // Eight are read at once.
+    for (int c = 0; c < 3; c++) {
+        PLIANT_TAKE(arena, e->offset[c], (size_t)e->vertex_count + 7);
+        PLIANT_TAKE(arena, e->normal[c], (size_t)e->vertex_count + 7);
+    }
 }
 
 static void place_vertex(const pliant_embedded_def *def, int32_t vertex, int32_t at,
@@ -36,8 +37,8 @@ static void place_vertex(const pliant_embedded_def *def, int32_t vertex, int32_t
     e->vertex[at] = vertex;
     for (int c = 0; c < 3; c++) {
         const int a = (c + 1) % 3, b = (c + 2) % 3;
-        e->offset[4 * (size_t)at + c] = def->offset[3 * (size_t)vertex + c];
-        e->normal[4 * (size_t)at + c] = scale * (u[a] * v[b] - u[b] * v[a]);
+        e->offset[c][at] = def->offset[3 * (size_t)vertex + c];
+        e->normal[c][at] = scale * (u[a] * v[b] - u[b] * v[a]);
     }
 }
 
@@ -93,47 +94,11 @@ void pliant_embedded_destroy(pliant_embedded *embedded)
 
 // ---- Evaluation ----
 
-typedef float row4 __attribute__((vector_size(16)));
-typedef float row8 __attribute__((vector_size(32)));  // two vertices: x, y, z, 0
+typedef float row8 __attribute__((vector_size(32)));
 typedef int32_t bits8 __attribute__((vector_size(32)));
-typedef float packed8 __attribute__((vector_size(32), aligned(16), may_alias));
+typedef float packed8 __attribute__((vector_size(32), aligned(4), may_alias));
 
 #define INLINE static inline __attribute__((always_inline))
-
-// Of a cell, in its offsets (r, s, t) from its least corner:
-//     x = c0 + r c1 + s c2 + r s c3 + t (c4 + r c5 + s c6 + r s c7)
-typedef struct cell_polynomial {
-    row4 c[8];
-} cell_polynomial;
-
-INLINE row4 load_corner(const float *x, int32_t slot)
-{
-    return (row4){x[slot], x[slot + PLIANT_LANES], x[slot + 2 * PLIANT_LANES], 0};
-}
-
-INLINE void find_polynomial(const float *x, const int32_t *slots, cell_polynomial *p)
-{
-    row4 corner[8];
-    for (int k = 0; k < 8; k++) corner[k] = load_corner(x, slots[k]);
-    const row4 r = corner[1] - corner[0], r_s = corner[3] - corner[2];
-    const row4 r_t = corner[5] - corner[4], r_st = corner[7] - corner[6];
-    const row4 s = corner[2] - corner[0], s_t = corner[6] - corner[4];
-    p->c[0] = corner[0];
-    p->c[1] = r;
-    p->c[2] = s;
-    p->c[3] = r_s - r;
-    p->c[4] = corner[4] - corner[0];
-    p->c[5] = r_t - r;
-    p->c[6] = s_t - s;
-    p->c[7] = (r_st - r_t) - (r_s - r);
-}
-
-// Component `c` of each vertex, in all its places.
-#define SPREAD(a, c)                                                                               \
-    __builtin_shufflevector((a), (a), (c), (c), (c), (c), 4 + (c), 4 + (c), 4 + (c), 4 + (c))
-// (y, z, x) of each vertex.
-#define TURN(a)    __builtin_shufflevector((a), (a), 1, 2, 0, 3, 5, 6, 4, 7)
-#define JOIN(a, b) __builtin_shufflevector((a), (b), 0, 1, 2, 3, 4, 5, 6, 7)
 
 // 1 / sqrt(a), to about two units in the last place: see polar_block.h.
 INLINE void find_inverse_root(const row8 *a, row8 *result)
@@ -144,48 +109,67 @@ INLINE void find_inverse_root(const row8 *a, row8 *result)
     *result = y;
 }
 
-INLINE void find_normals(float share, const row8 *normal, const row8 *r, const row8 *s,
-                         const row8 *t, row8 *result)
+// cof(F) N = N_x F_y x F_z + N_y F_z x F_x + N_z F_x x F_y, of length 1.
+INLINE void find_normals(float share, const row8 normal[3], const row8 r[3], const row8 s[3],
+                         const row8 t[3], row8 n[3])
 {
-    // cof(F) N = N_x F_y x F_z + N_y F_z x F_x + N_z F_x x F_y; a cross product is a x (y, z, x) of
-    // b less the opposite, turned once more.
-    const row8 r_turned = TURN(*r), s_turned = TURN(*s), t_turned = TURN(*t);
-    const row8 sum = SPREAD(*normal, 0) * (*s * t_turned - s_turned * *t) +
-                     SPREAD(*normal, 1) * (*t * r_turned - t_turned * *r) +
-                     SPREAD(*normal, 2) * (*r * s_turned - r_turned * *s);
-    const row8 n = TURN(sum) + share * *normal;
-    const row8 square = n * n, turned = TURN(square);
-    const row8 length = square + turned + TURN(turned);
-    row8 inverse;
-    find_inverse_root(&length, &inverse);
-    *result = n * inverse;
-}
-
-INLINE void store(const row8 *rows, const int32_t *vertices, int32_t count, pliant_vec3 *to)
-{
-    const float *from = (const float *)rows;
-    for (int32_t k = 0; k < count; k++)
-        to[vertices[k]] = (pliant_vec3){from[4 * k], from[4 * k + 1], from[4 * k + 2]};
-}
-
-// Two vertices from place `at` on, of which `count` are wanted.
-INLINE void evaluate_group(const pliant_embedded *e, const row8 c[8], int32_t at, int32_t count,
-                           pliant_vec3 *positions, pliant_vec3 *normals)
-{
-    const row8 offset = *(const packed8 *)(e->offset + 4 * (size_t)at);
-    const row8 r = SPREAD(offset, 0), s = SPREAD(offset, 1), t = SPREAD(offset, 2);
-    const row8 dr = c[1] + s * c[3] + t * (c[5] + s * c[7]);
-    if (positions) {
-        const row8 x = c[0] + s * c[2] + t * (c[4] + s * c[6]) + r * dr;
-        store(&x, e->vertex + at, count, positions);
+    row8 length = {0}, inverse;
+    for (int c = 0; c < 3; c++) {
+        const int a = (c + 1) % 3, b = (c + 2) % 3;
+        n[c] = share * normal[c] + normal[0] * (s[a] * t[b] - s[b] * t[a]) +
+               normal[1] * (t[a] * r[b] - t[b] * r[a]) + normal[2] * (r[a] * s[b] - r[b] * s[a]);
+        length += n[c] * n[c];
     }
+    find_inverse_root(&length, &inverse);
+    for (int c = 0; c < 3; c++) n[c] *= inverse;
+}
+
+INLINE void store(const row8 rows[3], const int32_t *vertices, int32_t count, pliant_vec3 *to)
+{
+    float numbers[3][8];
+    memcpy(numbers, rows, sizeof numbers);
+    // Unrolled, gcc 12 would shuffle the numbers out of registers one by one.
+#pragma GCC unroll 1
+    for (int32_t k = 0; k < count; k++)
+        to[vertices[k]] = (pliant_vec3){numbers[0][k], numbers[1][k], numbers[2][k]};
+}
+
+// One coordinate of eight vertices at offsets (r, s, t) of a cell, and its slopes along them, from
+// the cell's corners.
+INLINE void interpolate(const float *x, const int32_t slots[8], const row8 *r, const row8 *s,
+                        const row8 *t, row8 *at, row8 *dr, row8 *ds, row8 *dt)
+{
+    row8 low[4], slope[4];  // the edges along r, by s and t
+    for (int k = 0; k < 4; k++) {
+        const row8 from = x[slots[2 * k]] - (row8){0}, to = x[slots[2 * k + 1]] - (row8){0};
+        slope[k] = to - from;
+        low[k] = from + *r * slope[k];
+    }
+    const row8 across[2] = {low[1] - low[0], low[3] - low[2]};
+    const row8 near = low[0] + *s * across[0], far = low[2] + *s * across[1];
+    const row8 slope_near = slope[0] + *s * (slope[1] - slope[0]);
+    const row8 slope_far = slope[2] + *s * (slope[3] - slope[2]);
+    *dt = far - near;
+    *at = near + *t * *dt;
+    *ds = across[0] + *t * (across[1] - across[0]);
+    *dr = slope_near + *t * (slope_far - slope_near);
+}
+
+// Eight vertices of a cell from place `at` on, of which `count` are wanted.
+INLINE void evaluate_group(const pliant_embedded *e, const float *x, const int32_t *slots,
+                           int32_t at, int32_t count, pliant_vec3 *positions, pliant_vec3 *normals)
+{
+    const row8 r = *(const packed8 *)(e->offset[0] + at);
+    const row8 s = *(const packed8 *)(e->offset[1] + at);
+    const row8 t = *(const packed8 *)(e->offset[2] + at);
+    row8 place[3], dr[3], ds[3], dt[3], normal[3], n[3];
+    for (int c = 0; c < 3; c++)
+        interpolate(x + PLIANT_LANES * c, slots, &r, &s, &t, &place[c], &dr[c], &ds[c], &dt[c]);
+    if (positions) store(place, e->vertex + at, count, positions);
     if (normals) {
-        const row8 normal = *(const packed8 *)(e->normal + 4 * (size_t)at);
-        const row8 ds = c[2] + r * c[3] + t * (c[6] + r * c[7]);
-        const row8 dt = c[4] + r * c[5] + s * (c[6] + r * c[7]);
-        row8 n;
-        find_normals(e->rest_share, &normal, &dr, &ds, &dt, &n);
-        store(&n, e->vertex + at, count, normals);
+        for (int c = 0; c < 3; c++) normal[c] = *(const packed8 *)(e->normal[c] + at);
+        find_normals(e->rest_share, normal, dr, ds, dt, n);
+        store(n, e->vertex + at, count, normals);
     }
 }
 
@@ -200,26 +184,16 @@ INLINE int32_t find_cell(const pliant_embedded *e, int32_t place)
     return low;
 }
 
-// Two vertices lie in one cell or in two, and the next two begin in the last or after it.
 INLINE void evaluate(const pliant_embedded *e, const float *x, int32_t first, int32_t last,
                      pliant_vec3 *positions, pliant_vec3 *normals)
 {
-    cell_polynomial cells[2];
     int32_t cell = find_cell(e, first);
-    find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 2]);
-    for (int32_t at = first; at < last; at += 2) {
-        const int32_t count = last - at < 2 ? 1 : 2;
-        const cell_polynomial *of[2];
-        row8 c[8];
-        for (int32_t k = 0; k < 2; k++) {
-            if (k < count && at + k >= e->first_vertex[cell + 1]) {
-                cell++;
-                find_polynomial(x, e->corner_slot + 8 * (size_t)cell, &cells[cell % 2]);
-            }
-            of[k] = &cells[cell % 2];
-        }
-        for (int j = 0; j < 8; j++) c[j] = JOIN(of[0]->c[j], of[1]->c[j]);
-        evaluate_group(e, c, at, count, positions, normals);
+    for (int32_t at = first; at < last;) {
+        const int32_t cell_end = e->first_vertex[cell + 1], end = cell_end < last ? cell_end : last;
+        const int32_t count = end - at < 8 ? end - at : 8;
+        evaluate_group(e, x, e->corner_slot + 8 * (size_t)cell, at, count, positions, normals);
+        at += count;
+        cell += at == cell_end;
     }
 }
 

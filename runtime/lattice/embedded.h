@@ -20,8 +20,8 @@ typedef struct pliant_embedded {
     int32_t *corner_slot;   // shape [cell_count][8]: of corner (k & 1, k >> 1 & 1, k >> 2)
     int32_t *first_vertex;  // shape [cell_count + 1], in sorted order
     int32_t *vertex;        // shape [n]: of the model, at each place of the sorted order
-    float *offset;          // shape [n + 1][4]: in the cell, 0 .. 1; 0
-    float *normal;          // shape [n + 1][4]: N / (cell size)^2; 0
+    float *offset[3];       // shape [n + 7] each: x, y, z in the cell, 0 .. 1
+    float *normal[3];       // shape [n + 7] each: N / (cell size)^2
     pliant_arena arena;
 } pliant_embedded;
 
