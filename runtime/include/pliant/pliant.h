@@ -622,7 +622,7 @@ PLIANT_API pliant_body_motion pliant_body_measure(const pliant_body *body);
 // (LSM-15..17). The faces are the model's (pliant_model_faces).
 
 // Where the body's surface is, shape [vertex_count] each, m; either may be NULL. Normals are unit
-// vectors; where the surface has lost its extent, so that it has none, the one at rest. About 5 ns
+// vectors; where the surface has lost its extent, so that it has none, the one at rest. Some 10 ns
 // a vertex. Allocates nothing; threads may ask for one body at once while nothing changes it.
 // PLIANT_ERR_MISSING: the lattice has no surface.
 PLIANT_CALL pliant_status pliant_body_surface(const pliant_body *body, pliant_vec3 *positions,
