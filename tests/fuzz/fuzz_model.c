@@ -16,7 +16,19 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#define KIND_COUNT 6
+// Models without and with supports, dense files likewise, models with detail; with a lattice, and
+// with a lattice alone.
+static const struct {
+    int is_dense, parts;
+} kinds[] = {{0, 0},
+             {0, TINY_SUPPORTS},
+             {1, 0},
+             {1, 1},
+             {0, TINY_DETAIL},
+             {0, TINY_DETAIL | TINY_SUPPORTS},
+             {0, TINY_LATTICE},
+             {0, TINY_LATTICE | TINY_NO_GREENS}};
+#define KIND_COUNT ((int)(sizeof kinds / sizeof *kinds))
 
 typedef struct seed {
     unsigned char *bytes;
@@ -25,16 +37,16 @@ typedef struct seed {
     pliant_span spans[PLIANT_SECTION_LIMIT + 1];  // ascending: header with table, sections
 } seed;
 
-static seed seeds[KIND_COUNT];
+static seed seeds[sizeof kinds / sizeof *kinds];
 
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static void make_seed(int kind, seed *s)
 {
-    // Models without and with supports, dense files likewise, models with detail.
-    s->bytes = kind == 2 || kind == 3 ? image_of_dense(kind - 2, &s->size)
-                                      : image_of_model(2, kind < 2 ? kind : kind - 2, &s->size);
+    const int parts = kinds[kind].parts;
+    s->bytes =
+        kinds[kind].is_dense ? image_of_dense(parts, &s->size) : image_of_model(2, parts, &s->size);
     const pliant_header *header = (const pliant_header *)s->bytes;
     const pliant_entry *entries = (const pliant_entry *)(s->bytes + sizeof *header);
     s->spans[s->span_count++] =
@@ -129,6 +141,42 @@ static void evaluate_detail(const pliant_model *model, int32_t level)
     pliant_detail_destroy(detail);
 }
 
+// What binding lets through must do for a body: laid out as stored, and with regions found anew.
+static void move_lattice(const pliant_model *model, int32_t half_width)
+{
+    pliant_error err;
+    pliant_lattice *lattice;
+    pliant_body *body;
+    if (pliant_lattice_create(model, half_width, &lattice, &err) < 0) {
+        if (strchr(err.text, '\n')) abort();
+        return;
+    }
+    const pliant_lattice_info info = pliant_lattice_describe(lattice);
+    const size_t n = (size_t)info.vertex_count;
+    pliant_vec3 *positions = malloc(n * sizeof *positions), *normals = malloc(n * sizeof *normals);
+    if (!positions || !normals) abort();
+    if (pliant_body_create(lattice, NULL, &body, &err) == PLIANT_OK) {
+        for (int step = 0; step < 2; step++)
+            if (pliant_body_step(body, 0.01f) < 0) abort();
+        if (pliant_body_surface(body, positions, normals) < 0) abort();
+        pliant_body_destroy(body);
+    }
+    for (int32_t v = 0; v < info.vertex_count; v++) {
+        pliant_vertex_weights weights;
+        if (pliant_lattice_vertex(lattice, v, &weights) < 0) abort();
+        for (int k = 0; k < 8; k++)
+            if (weights.particle[k] < 0 || weights.particle[k] >= info.particle_count) abort();
+    }
+    for (int32_t b = 0; b < info.batch_count; b++) {
+        pliant_lattice_batch batch;
+        if (pliant_lattice_find_batch(lattice, b, &batch) < 0) abort();
+        if (batch.particle_count > PLIANT_BATCH_PARTICLES) abort();
+    }
+    free(normals);
+    free(positions);
+    pliant_lattice_destroy(lattice);
+}
+
 // Through the library's front door, from a file that lives in memory.
 static void open_model(const unsigned char *bytes, size_t size)
 {
@@ -140,6 +188,8 @@ static void open_model(const unsigned char *bytes, size_t size)
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
     if (pliant_model_open(path, &model, &err) == PLIANT_OK) {
         for (int32_t level = 0; level < 2; level++) evaluate_detail(model, level);
+        for (int32_t half_width = 0; half_width < 3; half_width += 2)
+            move_lattice(model, half_width);
         pliant_model_close(model);
     }
     close(file);
