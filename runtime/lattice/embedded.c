@@ -117,8 +117,10 @@ INLINE void find_normals(float share, const row8 normal[3], const row8 r[3], con
     row8 length = {0}, inverse;
     for (int c = 0; c < 3; c++) {
         const int a = (c + 1) % 3, b = (c + 2) % 3;
-        n[c] = share * normal[c] + normal[0] * (s[a] * t[b] - s[b] * t[a]) +
-               normal[1] * (t[a] * r[b] - t[b] * r[a]) + normal[2] * (r[a] * s[b] - r[b] * s[a]);
+        const row8 sum = normal[0] * (s[a] * t[b] - s[b] * t[a]) +
+                         normal[1] * (t[a] * r[b] - t[b] * r[a]) +
+                         normal[2] * (r[a] * s[b] - r[b] * s[a]);
+        n[c] = sum + share * normal[c];  // last: large terms that cancel would swallow it
         length += n[c] * n[c];
     }
     find_inverse_root(&length, &inverse);
