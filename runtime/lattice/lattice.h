@@ -37,7 +37,7 @@ typedef struct pliant_lattice_column {
 struct pliant_lattice {
     const pliant_model *model;  // for the embedded surface; NULL: made from a definition alone
     struct pliant_embedded *embedded;  // owned; NULL without a model
-    int32_t half_width;         // w
+    int32_t half_width;                // w
     int32_t dims[3];
     int32_t row_blocks;  // blocks that a row of dims[0] places takes
     int32_t particle_count, cell_count;

@@ -16,8 +16,8 @@ static void check_closed(const pliant_mesh *mesh)
     pliant_hierarchy *h = NULL;
     pliant_error err = {""};
     const int32_t none = 0;
-    check_ok(pliant_hierarchy_create(1, &mesh->vertex_count, mesh->face_count, mesh->faces, &none, &h,
-                                     &err),
+    check_ok(pliant_hierarchy_create(1, &mesh->vertex_count, mesh->face_count, mesh->faces, &none,
+                                     &h, &err),
              &err);
     pliant_hierarchy_destroy(h);
 }
@@ -42,14 +42,14 @@ static void lattices_of_any_cells_open_and_hold_a_closed_surface(void **state)
     pliant_error err = {""};
     for (check_cells shape = 0; shape < CHECK_CELLS_SHAPES; shape++)
         for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
-            check_lattice *l = check_lattice_create(
-                &(check_lattice_def){.shape = shape,
-                                     .size = sizes[i],
-                                     .half_width = widths[i],
-                                     .cell_size = 0.5,
-                                     .origin = {1, -2, 3},
-                                     .inset = i == 0 ? 0x1p-40 : 0.25,
-                                     .is_shell = shape == CHECK_CELLS_SHELL});
+            check_lattice *l =
+                check_lattice_create(&(check_lattice_def){.shape = shape,
+                                                          .size = sizes[i],
+                                                          .half_width = widths[i],
+                                                          .cell_size = 0.5,
+                                                          .origin = {1, -2, 3},
+                                                          .inset = i == 0 ? 0x1p-40 : 0.25,
+                                                          .is_shell = shape == CHECK_CELLS_SHELL});
             const char *path = scratch("cells.h5");
             check_lattice_write(l, path);
             pliant_model *model = NULL;
@@ -81,8 +81,9 @@ static void a_file_with_a_lattice_alone_has_no_solvers(void **state)
     pliant_exchange *exchange = NULL;
     check_ok(pliant_model_open(path, &model, &err), &err);
     assert_int_equal(pliant_solver_create(model, NULL, &solver, &err), PLIANT_ERR_MISSING);
-    check_contains(err.text, "alone.h5: expected Green's functions, found a lattice only (made with "
-                             "--no-greens)");
+    check_contains(err.text,
+                   "alone.h5: expected Green's functions, found a lattice only (made with "
+                   "--no-greens)");
     assert_null(solver);
     assert_int_equal(pliant_exchange_create(model, NULL, &exchange, &err), PLIANT_ERR_MISSING);
     assert_null(exchange);
@@ -200,7 +201,8 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
         {"particles", 0, -1, "particles: element 0: expected 0 to 1023, found -1"},
         {"particles", -1, 1024, "particles: element 104: expected 0 to 1023, found 1024"},
         {"particles", 12, 5, "particles: row 4: expected corner 1 of cell 2 before it, found none"},
-        {"particles", -3, 3, "particles: row 34: expected corner 7 of cell 8 before it, found none"},
+        {"particles", -3, 3,
+         "particles: row 34: expected corner 7 of cell 8 before it, found none"},
         {"mass", 3, 0, "mass: element 3: expected a finite number above 0, found 0"},
         {"mass", -1, NAN, "mass: element 34: expected a finite number above 0, found nan"},
         {"mass", 0, INFINITY, "mass: element 0: expected a finite number above 0, found inf"},
@@ -209,7 +211,8 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
         {"region_size", 4, 7, "region_size: element 4: expected 8 to 8, found 7"},
         {"region_share", 0, 1, "region_share: element 0: expected 0 to 0, found 1"},
         {"region_share", 2, -1, "region_share: element 2: expected 0 to 2, found -1"},
-        {"region_share", -1, 4, "region_share: element 34: expected a particle that shares with itself"},
+        {"region_share", -1, 4,
+         "region_share: element 34: expected a particle that shares with itself"},
         {"region_nodes", 0, -1, "region_nodes: element 0: expected 0 to 34, found -1"},
         {"region_nodes", -4, 35, "region_nodes: element 48: expected "},
         {"region_nodes", 4, 2, "region_nodes: element 4: expected 3 to 34, found 2"},
@@ -217,15 +220,19 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
         {"region_nodes", 1, 0, "region_nodes: element 1: expected -1 to -1, found 0"},
         {"region_nodes", 2, -3, "region_nodes: element 2: expected -2 to "},
         {"region_nodes", 2, 1000, "region_nodes: element 2: expected -2 to "},
-        {"region_nodes", 2, 2, "region_nodes: element 2: expected a plate node at (2, 0, 0), found node 2 at "},
+        {"region_nodes", 2, 2,
+         "region_nodes: element 2: expected a plate node at (2, 0, 0), found node 2 at "},
         {"plate_nodes", 0, 5, "plate_nodes: element 0: expected 0 to 4, found 5"},
         {"plate_nodes", 1, -1, "plate_nodes: element 1: expected 0 to 2, found -1"},
         {"plate_nodes", 2, 3, "plate_nodes: element 2: expected 0 to 2, found 3"},
-        {"plate_nodes", 2, 1, "region_nodes: element 2: expected a plate node at (2, 0, 0), found node 0 at (2, 0, 1)"},
+        {"plate_nodes", 2, 1,
+         "region_nodes: element 2: expected a plate node at (2, 0, 0), found node 0 at (2, 0, 1)"},
         {"plate_nodes", 4, 8, "plate_nodes: element 4: expected bits 0 to 2 and 31, found 0x8"},
         {"plate_nodes", 3, 1, "plate_nodes: element 3: expected some of 0, found 0x1"},
-        {"plate_nodes", 4, INT_MIN, "plate_nodes: element 4: expected all of 0x7, found 0x80000000"},
-        {"plate_nodes", 4, INT_MIN + 3, "plate_nodes: element 4: expected all of 0x7, found 0x80000003"},
+        {"plate_nodes", 4, INT_MIN,
+         "plate_nodes: element 4: expected all of 0x7, found 0x80000000"},
+        {"plate_nodes", 4, INT_MIN + 3,
+         "plate_nodes: element 4: expected all of 0x7, found 0x80000003"},
         {"vertex_cell", 5, 9, "vertex_cell: element 5: expected 0 to 8, found 9"},
         {"vertex_cell", 0, -1, "vertex_cell: element 0: expected 0 to 8, found -1"},
         {"vertex_offset", 7, 1.0001, "vertex_offset: element 7: expected 0 to 1, found 1.0001"},
@@ -233,13 +240,16 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
         {"vertex_offset", 0, NAN, "vertex_offset: element 0: expected 0 to 1, found nan"},
         {"vertex_tangents", 1, NAN, "vertex_tangents: vertex 0: expected two unit vectors"},
         {"vertex_tangents", -1, INFINITY, "vertex_tangents: vertex 65: expected two unit vectors"},
-        {"vertex_tangents", 6, 0.5, "vertex_tangents: vertex 1: expected two unit vectors at a right angle"},
+        {"vertex_tangents", 6, 0.5,
+         "vertex_tangents: vertex 1: expected two unit vectors at a right angle"},
         {"batch_face_offset", 0, 1, "batch_face_offset: element 0: expected 0 to 0, found 1"},
         {"batch_face_offset", 1, -1, "batch_face_offset: element 1: expected 0 to 128, found -1"},
         {"batch_face_offset", 1, 129, "batch_face_offset: element 1: expected 0 to 128, found 129"},
-        {"batch_face_offset", 2, 127, "batch_face_offset: element 2: expected 128 to 128, found 127"},
+        {"batch_face_offset", 2, 127,
+         "batch_face_offset: element 2: expected 128 to 128, found 127"},
         {"batch_faces", 0, 128, "batch_faces: element 0: expected 0 to 127, found 128"},
-        {"batch_faces", 1, 127, "batch_faces: element 1: expected a face that is not in a batch yet, found 127"},
+        {"batch_faces", 1, 127,
+         "batch_faces: element 1: expected a face that is not in a batch yet, found 127"},
         {"batch_faces", -1, -1, "batch_faces: element 127: expected 0 to 127, found -1"},
         {"batch_point_offset", 0, 1, "batch_point_offset: element 0: expected 0 to 0, found 1"},
         {"batch_point_offset", 1, 55, "batch_point_offset: element 1: expected 0 to 54, found 55"},
@@ -249,7 +259,8 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
         {"batch_points", 2, 1, "batch_points: element 2: expected 2 to 34, found 1"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        for (int parts = TINY_LATTICE; parts <= (TINY_LATTICE | TINY_NO_GREENS); parts += TINY_NO_GREENS) {
+        for (int parts = TINY_LATTICE; parts <= (TINY_LATTICE | TINY_NO_GREENS);
+             parts += TINY_NO_GREENS) {
             pliant_error err = {""};
             tiny_file file;
             char path[PLIANT_PATH_LIMIT];
@@ -258,7 +269,8 @@ static void damaged_lattices_are_refused_by_section_and_element(void **state)
             set_element(tiny_find(&file, path), cases[i].element, cases[i].value);
             const pliant_status status = bind(&file, &err);
             if (status != PLIANT_ERR_FORMAT)
-                fail_msg("%s[%d] = %g: status %d", path, (int)cases[i].element, cases[i].value, status);
+                fail_msg("%s[%d] = %g: status %d", path, (int)cases[i].element, cases[i].value,
+                         status);
             check_contains(err.text, cases[i].reason);
             tiny_free(&file);
         }
@@ -291,7 +303,8 @@ static void a_lattice_is_stored_whole_or_not_at_all(void **state)
     // Neither: the mesh is no model.
     tiny_model_make(2, TINY_LATTICE | TINY_NO_GREENS, &file);
     for (int32_t i = file.section_count; i-- > 0;)
-        if (strncmp(file.sections[i].def.path, "/lattice/", 9) == 0) drop(&file, file.sections[i].def.path);
+        if (strncmp(file.sections[i].def.path, "/lattice/", 9) == 0)
+            drop(&file, file.sections[i].def.path);
     assert_int_equal(bind(&file, &err), PLIANT_ERR_MISSING);
     check_contains(err.text, "file: expected Green's functions or a lattice, found a mesh only");
     tiny_free(&file);
@@ -315,7 +328,8 @@ static void batches_are_bounded(void **state)
     check_lattice_write(l, path);
     check_ok(pliant_reader_open(path, &reader, &err), &err);
     assert_int_equal(pliant_model_view_bind(reader, &v, &err), PLIANT_ERR_FORMAT);
-    check_contains(err.text, "/lattice/batch_point_offset: element 1: expected 0 to 128, found 129");
+    check_contains(err.text,
+                   "/lattice/batch_point_offset: element 1: expected 0 to 128, found 129");
     pliant_reader_close(reader);
     check_lattice_destroy(l);
 }
@@ -324,21 +338,26 @@ static void layouts_of_impossible_lattices_are_refused(void **state)
 {
     (void)state;
     static const pliant_lattice_layout cases[] = {
-        {-1, 8, 1, 0, 0, 1, 8},  {1, 7, 1, 0, 0, 1, 8},  {1, 8, 0, 0, 0, 1, 8},
-        {1, 8, 16, 0, 0, 1, 8},  {1, 8, 1, 9, 0, 1, 8},  {1, 8, 1, 0, -1, 1, 8},
-        {1, 8, 1, 0, 0, 0, 8},   {1, 8, 1, 0, 0, 1, 7},  {0, 0, 0, 0, 0, 0, 0},
-        {PLIANT_LATTICE_LIMIT + 1, 8, 1, 0, 0, 1, 8},
+        {-1, 8, 1, 0, 0, 1, 8}, {1, 7, 1, 0, 0, 1, 8},
+        {1, 8, 0, 0, 0, 1, 8},  {1, 8, 16, 0, 0, 1, 8},
+        {1, 8, 1, 9, 0, 1, 8},  {1, 8, 1, 0, -1, 1, 8},
+        {1, 8, 1, 0, 0, 0, 8},  {1, 8, 1, 0, 0, 1, 7},
+        {0, 0, 0, 0, 0, 0, 0},  {PLIANT_LATTICE_LIMIT + 1, 8, 1, 0, 0, 1, 8},
     };
     pliant_error err = {""};
     pliant_section_def sections[PLIANT_SECTION_LIMIT];
     int32_t count = -7;
-    pliant_model_layout layout = {.vertex_count = 6, .face_count = 8, .level_count = 1, .base_count = 6,
+    pliant_model_layout layout = {.vertex_count = 6,
+                                  .face_count = 8,
+                                  .level_count = 1,
+                                  .base_count = 6,
                                   .lattice = {1, 8, 1, 0, 0, 1, 8}};
     check_ok(pliant_model_layout_sections(&layout, sections, &count, &err), &err);
     assert_int_equal(count, 7 + 16);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         layout.lattice = cases[i];
-        assert_int_equal(pliant_model_layout_sections(&layout, sections, &count, &err), PLIANT_ERR_ARGUMENT);
+        assert_int_equal(pliant_model_layout_sections(&layout, sections, &count, &err),
+                         PLIANT_ERR_ARGUMENT);
     }
     assert_int_equal(count, 7 + 16);
 }
