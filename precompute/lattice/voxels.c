@@ -13,9 +13,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A list of the cells, of their corners with room for all eight of each, and what the lattice makes
-// of them: corner numbers, measures, regions.
-static const double bytes_per_cell = 12 + 8 * 12 + 8 * 4 + 16 + 64;
+// The list of the cells, and what a lattice makes of it: corner numbers, measures, particles and
+// regions at about one particle a cell.
+static const double bytes_per_cell = 12 + 8 * 4 + 16 + 100;
+// Sets of the grid's size: of this file (solid and shell), and of the links of common/links.h.
+enum { SOLID_SETS = 4, SHELL_SETS = 1, LINK_SETS = 15 };
 
 // ---- Touched cells ----
 
@@ -243,8 +245,9 @@ pliant_status pliant_voxels_create(const pliant_mesh *mesh, const char *name, in
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected 1 to %d cells, found %d",
                                 PLIANT_VOXEL_CELL_LIMIT, cells);
     const pliant_voxel_grid grid = pliant_voxel_grid_place(mesh, cells);
-    const int sets = filling == PLIANT_VOXELS_SOLID ? 4 : 1;
-    double needed = sets * pliant_cell_set_bytes(grid.dims);
+    const int sets = filling == PLIANT_VOXELS_SOLID ? SOLID_SETS : SHELL_SETS;
+    const double set_bytes = pliant_cell_set_bytes(grid.dims);
+    double needed = (sets + LINK_SETS) * set_bytes;
     const double whole = (double)grid.dims[0] * grid.dims[1] * grid.dims[2];
     if (available > 0 && needed > available)
         return refuse_size(name, &grid, whole, needed, available, err);
@@ -259,7 +262,7 @@ pliant_status pliant_voxels_create(const pliant_mesh *mesh, const char *name, in
     if (status == PLIANT_OK) status = fill(mesh, parts, v, err);
     if (status < 0) goto done;
     v->cell_count = pliant_cell_set_number(v->set);
-    needed = v->cell_count * bytes_per_cell;
+    needed = v->cell_count * bytes_per_cell + LINK_SETS * set_bytes;
     if (v->cell_count > INT32_MAX / 8 || (available > 0 && needed > available)) {
         status = refuse_size(name, &grid, v->cell_count, needed, available, err);
         goto done;
