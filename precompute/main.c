@@ -18,10 +18,32 @@ static double factor(const pliant_compression_result *r)
     return r->kept ? (double)r->dense / (double)r->kept : 0;
 }
 
+static const char *filling_text(const pliant_lattice_summary *lattice)
+{
+    return lattice->filling == PLIANT_VOXELS_SOLID ? "solid" : "shell";
+}
+
+static void print_text_lattice(const pliant_lattice_summary *l)
+{
+    printf("  lattice      %d particles, %d cells of %.4g (%s), %d component%s, %.6g kg\n", l->particles, l->cells,
+           l->cell_size, filling_text(l), l->components, l->components == 1 ? "" : "s", l->mass);
+    printf("               %d regions of half-width %d, %d of them irregular; %d triangle batches\n", l->regions,
+           l->half_width, l->irregular_regions, l->batches);
+}
+
 static void print_text(const pliant_options *options, const pliant_run_summary *s)
 {
-    printf("%s: %d vertices in %d level%s, %d free, %d held, %.2f MB\n", options->output, s->vertex_count,
-           s->level_count, s->level_count == 1 ? "" : "s", s->free_count, s->fixed_count, s->file_bytes / 1e6);
+    const pliant_run_times *t = &s->times;
+    printf("%s: %d vertices in %d level%s, ", options->output, s->vertex_count, s->level_count,
+           s->level_count == 1 ? "" : "s");
+    if (options->greens == PLIANT_GREENS_NONE) {
+        printf("%d faces, %.2f MB\n", s->face_count, s->file_bytes / 1e6);
+        print_text_lattice(&s->lattice);
+        printf("  seconds      read %.2f, lattice %.2f, write %.2f, total %.2f\n", t->read, t->lattice, t->write,
+               t->total);
+        return;
+    }
+    printf("%d free, %d held, %.2f MB\n", s->free_count, s->fixed_count, s->file_bytes / 1e6);
     if (s->detail_steps > 0)
         printf("  detail       %d vertices, %d step%s finer; offsets %.3g (RMS), %.3g (largest), tangential part "
                "%.3g, %.3g\n",
@@ -35,10 +57,10 @@ static void print_text(const pliant_options *options, const pliant_run_summary *
                    pliant_block_text((pliant_block_name)b), l, s->column_counts[b][l],
                    (unsigned long long)r->kept, (unsigned long long)r->dense, factor(r), r->rms, r->max);
         }
-    const pliant_run_times *t = &s->times;
-    printf("  seconds      read %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
+    if (options->lattice_cells > 0) print_text_lattice(&s->lattice);
+    printf("  seconds      read %.2f, lattice %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
            "%.2f, write %.2f, total %.2f\n",
-           t->read, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+           t->read, t->lattice, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
 }
 
 static void print_json_text(const char *text)
@@ -77,15 +99,32 @@ static void print_json_block(const pliant_run_summary *s, pliant_block_name bloc
     printf("]}");
 }
 
+static void print_json_lattice(const pliant_lattice_summary *l)
+{
+    printf(", \"lattice\": {\"particles\": %d, \"cells\": %d, \"cell_size\": %.9g, \"dims\": [%d, %d, %d]"
+           ", \"filling\": \"%s\", \"half_width\": %d, \"components\": %d, \"regions\": %d"
+           ", \"irregular_regions\": %d, \"batches\": %d, \"mass\": %.9g}",
+           l->particles, l->cells, l->cell_size, l->dims[0], l->dims[1], l->dims[2], filling_text(l), l->half_width,
+           l->components, l->regions, l->irregular_regions, l->batches, l->mass);
+}
+
 static void print_json(const pliant_options *options, const pliant_run_summary *s)
 {
+    const pliant_run_times *t = &s->times;
     printf("{\"output\": ");
     print_json_text(options->output);
-    printf(", \"vertices\": %d, \"faces\": %d, \"levels\": %d, \"free\": %d, \"fixed\": %d, \"components\": %d"
-           ", \"ranks\": %d, \"solver\": \"%s\", \"volume\": %.9g, \"residual\": %.3g, \"memory_bytes\": %.0f"
-           ", \"file_bytes\": %.0f",
-           s->vertex_count, s->face_count, s->level_count, s->free_count, s->fixed_count, s->component_count,
-           s->ranks, s->solver, s->volume, s->residual, s->memory_bytes, s->file_bytes);
+    printf(", \"vertices\": %d, \"faces\": %d, \"levels\": %d, \"components\": %d, \"ranks\": %d"
+           ", \"volume\": %.9g, \"file_bytes\": %.0f",
+           s->vertex_count, s->face_count, s->level_count, s->component_count, s->ranks, s->volume,
+           s->file_bytes);
+    if (options->lattice_cells > 0) print_json_lattice(&s->lattice);
+    if (options->greens == PLIANT_GREENS_NONE) {
+        printf(", \"seconds\": {\"read\": %.3f, \"lattice\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n",
+               t->read, t->lattice, t->write, t->total);
+        return;
+    }
+    printf(", \"free\": %d, \"fixed\": %d, \"solver\": \"%s\", \"residual\": %.3g, \"memory_bytes\": %.0f",
+           s->free_count, s->fixed_count, s->solver, s->residual, s->memory_bytes);
     if (s->detail_steps > 0)
         printf(", \"detail\": {\"steps\": %d, \"vertices\": %d, \"rms\": %.6g, \"largest\": %.6g, "
                "\"tangential_rms\": %.6g, \"tangential_largest\": %.6g, \"least_sine\": %.3g}",
@@ -97,10 +136,9 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
         if (b > 0) printf(", ");
         print_json_block(s, (pliant_block_name)b);
     }
-    const pliant_run_times *t = &s->times;
-    printf("}, \"seconds\": {\"read\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
+    printf("}, \"seconds\": {\"read\": %.3f, \"lattice\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
            "\"transform\": %.3f, \"compress\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n",
-           t->read, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+           t->read, t->lattice, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
 }
 
 // The command line as one would type it again, on one line.
@@ -139,8 +177,8 @@ static int run(int argc, char **argv, int rank)
     }
     if (action != PLIANT_OPTIONS_RUN) {
         if (rank > 0) return EXIT_DONE;
-        if (action == PLIANT_OPTIONS_HELP) fputs(pliant_options_help(), stdout);
-        else printf("%s %s\n", program, PLIANT_VERSION_TEXT);
+        if (action == PLIANT_OPTIONS_VERSION) printf("%s %s\n", program, PLIANT_VERSION_TEXT);
+        else for (const char *const *part = pliant_options_help; *part; part++) fputs(*part, stdout);
         return fflush(stdout) == 0 ? EXIT_DONE : EXIT_FAILED;
     }
     pliant_progress progress = pliant_progress_create(

@@ -126,22 +126,17 @@ static void summarise(const pliant_greens *g, pliant_block_name block, int32_t l
 }
 
 // The first rank's part besides the columns.
-static pliant_status write_mesh(pliant_writer *writer, const pliant_greens *g,
-                                const pliant_options *options, const char *provenance, pliant_error *err)
+static pliant_status write_rest(pliant_writer *writer, const pliant_greens *g,
+                                const pliant_lattice_data *lattice, const pliant_options *options,
+                                const char *provenance, pliant_error *err)
 {
     const pliant_problem *p = g->problem;
-    const pliant_multires *m = p->multires;
-    const double material[3] = {options->material.young, options->material.poisson, options->material.density};
+    pliant_status status = pliant_surface_output_write(writer, p->multires, &options->material, err);
+    if (status < 0) return status;
     const struct {
         const char *path;
         const void *data;
     } sections[] = {
-        {"/mesh/vertices", m->mesh->vertices},
-        {"/mesh/faces", m->mesh->faces},
-        {"/mesh/level_count", m->vertex_count},
-        {"/mesh/parents", m->parents},
-        {"/mesh/source_index", m->source_index},
-        {"/material", material},
         {"/domains/free/nodes", p->free_nodes},
         {"/domains/free/level_offset", p->free_wavelet->level_offset},
         {"/domains/fixed/nodes", p->fixed_nodes},
@@ -149,21 +144,22 @@ static pliant_status write_mesh(pliant_writer *writer, const pliant_greens *g,
         {"/body/gravity/free", g->gravity_free},
     };
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) {
-        const pliant_status status = pliant_writer_write_all(writer, sections[i].path, sections[i].data, err);
+        status = pliant_writer_write_all(writer, sections[i].path, sections[i].data, err);
         if (status < 0) return status;
     }
     if (p->relief) {
         const pliant_relief *r = p->relief;
-        pliant_status status = pliant_writer_write_all(writer, "/detail/level_count", r->vertex_count, err);
+        status = pliant_writer_write_all(writer, "/detail/level_count", r->vertex_count, err);
         if (status == PLIANT_OK) status = pliant_writer_write_all(writer, "/detail/offset", r->offset, err);
         if (status == PLIANT_OK)
             status = pliant_writer_write_all(writer, "/detail/source_index", r->source_index, err);
         if (status < 0) return status;
     }
     if (options->blocks == PLIANT_BLOCKS_ALL) {
-        const pliant_status status = pliant_writer_write_all(writer, "/body/gravity/fixed", g->gravity_fixed, err);
+        status = pliant_writer_write_all(writer, "/body/gravity/fixed", g->gravity_fixed, err);
         if (status < 0) return status;
     }
+    if (lattice && (status = pliant_lattice_output_write(writer, lattice, err)) < 0) return status;
     return pliant_writer_write_provenance(writer, provenance, err);
 }
 
@@ -172,7 +168,8 @@ typedef struct all_offsets {
     uint64_t *of[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
 } all_offsets;
 
-static pliant_status create(const char *path, const pliant_greens *g, const pliant_options *options,
+static pliant_status create(const char *path, const pliant_greens *g,
+                            const pliant_lattice_data *lattice, const pliant_options *options,
                             const char *provenance, const all_offsets *offsets, pliant_writer **writer,
                             pliant_error *err)
 {
@@ -191,6 +188,7 @@ static pliant_status create(const char *path, const pliant_greens *g, const plia
         layout.detail_steps = p->relief->step_count;
         layout.detail_vertex_count = p->relief->vertex_count[p->relief->step_count];
     }
+    if (lattice) layout.lattice = pliant_lattice_output_layout(lattice);
     for (int32_t l = 0; l <= finest; l++) {
         layout.free_columns[l] = p->free_hats->level_offset[l + 1];
         layout.fixed_columns[l] = p->fixed_hats->level_offset[l + 1];
@@ -228,8 +226,8 @@ static PetscErrorCode write_level(pliant_writer *writer, pliant_greens *g, plian
 }
 
 // Collective.
-static PetscErrorCode write_model(const char *path, pliant_greens *g, const pliant_options *options,
-                                  const char *provenance, all_offsets *offsets, pliant_writer **writer,
+static PetscErrorCode write_model(const char *path, pliant_greens *g, const pliant_lattice_data *lattice,
+                                  const pliant_options *options, const char *provenance, all_offsets *offsets, pliant_writer **writer,
                                   double *bytes, pliant_error *err)
 {
     PetscFunctionBegin;
@@ -246,8 +244,8 @@ static PetscErrorCode write_model(const char *path, pliant_greens *g, const plia
         }
     pliant_status status = PLIANT_OK;
     if (rank == 0) {
-        status = create(path, g, options, provenance, offsets, writer, err);
-        if (status == PLIANT_OK) status = write_mesh(*writer, g, options, provenance, err);
+        status = create(path, g, lattice, options, provenance, offsets, writer, err);
+        if (status == PLIANT_OK) status = write_rest(*writer, g, lattice, options, provenance, err);
     }
     PliantCall(g->comm, status, err);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
@@ -265,13 +263,13 @@ static PetscErrorCode write_model(const char *path, pliant_greens *g, const plia
 }
 
 PetscErrorCode pliant_model_output_write(const char *path, pliant_greens *g,
-                                         const pliant_options *options, const char *provenance,
+                                         const pliant_lattice_data *lattice, const pliant_options *options, const char *provenance,
                                          double *bytes, pliant_error *err)
 {
     PetscFunctionBegin;
     all_offsets offsets = {0};
     pliant_writer *writer = NULL;
-    const PetscErrorCode code = write_model(path, g, options, provenance, &offsets, &writer, bytes, err);
+    const PetscErrorCode code = write_model(path, g, lattice, options, provenance, &offsets, &writer, bytes, err);
     pliant_writer_abandon(writer);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) PetscCall(PetscFree(offsets.of[b][l]));

@@ -4,6 +4,7 @@
 #include "mesh/region.h"
 
 #include "pliant/error.h"
+#include "pliant/links.h"
 #include "pliant/option.h"
 
 #include <errno.h>
@@ -12,69 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char help[] =
-    "usage: mpirun -n P pliant-precompute [options] MESH -o MODEL.h5\n"
-    "\n"
-    "Solve for the Green's functions of an elastic solid, compress them with surface wavelets and\n"
-    "write them to an HDF5 file that pliant-play and libpliant map. MESH is a closed triangle surface\n"
-    "(OBJ, PLY, STL, OFF and more).\n"
-    "\n"
-    "Levels (wavelets need them)\n"
-    "  --subdivide L           take MESH as base mesh and split every triangle into four, L times (0: as\n"
-    "                          it is, on one level, which stores every column whole)\n"
-    "  --scheme SCHEME         loop, butterfly or midpoint (default loop)\n"
-    "                          Without --subdivide, MESH is the finest level and its subdivision\n"
-    "                          connectivity is detected, whatever its vertex order.\n"
-    "  --detail D              the D finest levels are geometric detail: elasticity is solved on the mesh\n"
-    "                          of the others, the finer shape is stored as a displaced subdivision\n"
-    "                          surface that moves with it\n"
-    "Support\n"
-    "  --fixed EXPR            hold the vertices where EXPR is true at rest: z<0.1, x>=2 and y<0,\n"
-    "                          all(z<0.1, x>0), any(...), not(...), box(x0,y0,z0, x1,y1,z1),\n"
-    "                          sphere(x,y,z, r)\n"
-    "  --fixed-list FILE       hold these vertices of MESH (0-based, separated by white space); with\n"
-    "                          --subdivide also the new vertices between two held ones\n"
-    "Material, in any consistent units\n"
-    "  --young E               Young's modulus (default 1)\n"
-    "  --poisson NU            Poisson's ratio, over -1 and under 0.5 (default 0.3)\n"
-    "  --density RHO           for gravity (default 1)\n"
-    "  --method bem            discretisation: boundary elements (default)\n"
-    "Compression\n"
-    "  --rms R, --max X        stay under these errors (GF-70, GF-71), either or both; the sparsest set\n"
-    "                          is sought (default --rms 0.02 --max 0.05; thin parts under fine contact\n"
-    "                          want a smaller --max: the player says so when it matters)\n"
-    "  --eps EPS               the paper's threshold instead (GF-31..33)\n"
-    "  --wavelet WAVELET       linear or butterfly (default butterfly)\n"
-    "  --no-lift               without the lifting update\n"
-    "  --boundary RULE         stencil nodes beyond the free surface count as zero or are dropped:\n"
-    "                          zero or drop (default zero)\n"
-    "Columns\n"
-    "  --constraint-levels A..B\n"
-    "                          store the hierarchical Green's functions of levels A to B (A alone: of one\n"
-    "                          level; default: of all). Those of level B are solved for, coarser ones come\n"
-    "                          from them by refinement. Rows keep full resolution; with B under the\n"
-    "                          finest level, time for solving and memory for right-hand sides shrink\n"
-    "                          fourfold a level. The file then takes constraints on these levels.\n"
-    "  --blocks free|all       free-free block only (default), or supports and reactions too\n"
-    "Output\n"
-    "  -o, --output MODEL.h5   the model; written whole or not at all\n"
-    "  --dense FILE.h5         also store the exact dense columns of the finest level (small models, for\n"
-    "                          comparisons)\n"
-    "  --force                 replace existing outputs\n"
-    "  -q, --quiet             print errors only (and the summary with --json)\n"
-    "  --json                  print the summary as one JSON object\n"
-    "  -h, --help  --version\n"
-    "\n"
-    "PETSc's own options come through PETSC_OPTIONS. Temporary columns go to TMPDIR, or beside the\n"
-    "output. Exit status: 0 done, 1 failed, 2 misused.\n"
-    "\n"
-    "example: mpirun -n 2 pliant-precompute --subdivide 4 --fixed 'z<0.1' base.obj -o model.h5\n";
-
-const char *pliant_options_help(void)
-{
-    return help;
-}
 
 enum {
     OPTION_SUBDIVIDE = 256,
@@ -94,6 +32,12 @@ enum {
     OPTION_BOUNDARY,
     OPTION_CONSTRAINT_LEVELS,
     OPTION_BLOCKS,
+    OPTION_LATTICE,
+    OPTION_HALF_WIDTH,
+    OPTION_SOLID,
+    OPTION_SHELL,
+    OPTION_LATTICE_MASS,
+    OPTION_NO_GREENS,
     OPTION_DENSE,
     OPTION_FORCE,
     OPTION_JSON,
@@ -119,6 +63,12 @@ static const struct option long_options[] = {
     {"output", required_argument, NULL, 'o'},
     {"constraint-levels", required_argument, NULL, OPTION_CONSTRAINT_LEVELS},
     {"blocks", required_argument, NULL, OPTION_BLOCKS},
+    {"lattice", required_argument, NULL, OPTION_LATTICE},
+    {"half-width", required_argument, NULL, OPTION_HALF_WIDTH},
+    {"solid", no_argument, NULL, OPTION_SOLID},
+    {"shell", no_argument, NULL, OPTION_SHELL},
+    {"lattice-mass", required_argument, NULL, OPTION_LATTICE_MASS},
+    {"no-greens", no_argument, NULL, OPTION_NO_GREENS},
     {"dense", required_argument, NULL, OPTION_DENSE},
     {"force", no_argument, NULL, OPTION_FORCE},
     {"quiet", no_argument, NULL, 'q'},
@@ -186,6 +136,55 @@ static pliant_status word(const char *option, const char *text, const char *cons
     return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected %s, found '%s'", option, expected, text);
 }
 
+// What an option goes with, so that none is given in vain.
+typedef enum option_kind { KIND_ANY, KIND_GREENS, KIND_LATTICE, KIND_COUNT } option_kind;
+
+static option_kind kind_of(int code)
+{
+    switch (code) {
+    case OPTION_DETAIL:
+    case OPTION_METHOD:
+    case OPTION_RMS:
+    case OPTION_MAX:
+    case OPTION_EPS:
+    case OPTION_WAVELET:
+    case OPTION_NO_LIFT:
+    case OPTION_BOUNDARY:
+    case OPTION_CONSTRAINT_LEVELS:
+    case OPTION_BLOCKS:
+    case OPTION_DENSE: return KIND_GREENS;
+    case OPTION_HALF_WIDTH:
+    case OPTION_SOLID:
+    case OPTION_SHELL:
+    case OPTION_LATTICE_MASS:
+    case OPTION_NO_GREENS: return KIND_LATTICE;
+    default: return KIND_ANY;
+    }
+}
+
+static const char *name_of(int code)
+{
+    const struct option *option = long_options;
+    while (option->val != code) option++;
+    return option->name;
+}
+
+// Do the options that were given go together? `given` has an option's name of each kind, or NULL.
+static pliant_status check_kinds(const pliant_options *o, const char *const given[KIND_COUNT],
+                                 pliant_error *err)
+{
+    if (o->lattice_cells == 0 && given[KIND_LATTICE])
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s goes with --lattice CELLS", given[KIND_LATTICE]);
+    if (o->greens == PLIANT_GREENS_NONE && given[KIND_GREENS])
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s is for Green's functions, --no-greens makes none",
+                                given[KIND_GREENS]);
+    if (o->greens == PLIANT_GREENS_SOLVE && !o->fixed_expression && !o->fixed_list)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "nothing holds the solid: give --fixed EXPR (such as 'z<0.1') or --fixed-list "
+                                "FILE%s", o->lattice_cells > 0 ? ", or --no-greens for a lattice only" : "");
+    return PLIANT_OK;
+}
+
 pliant_status pliant_options_parse(int argc, char **argv, pliant_options *options,
                                    pliant_options_action *action, pliant_error *err)
 {
@@ -193,14 +192,16 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
                         .scheme = PLIANT_SUBDIVIDE_LOOP,
                         .material = {.young = 1, .poisson = 0.3, .density = 1},
                         .wavelet = pliant_wavelet_default(),
-                        .constraint_levels = {-1, -1}};
+                        .constraint_levels = {-1, -1},
+                        .half_width = 2};
     static const char *const schemes[] = {"loop", "butterfly", "midpoint"};
     static const char *const wavelets[] = {"linear", "butterfly"};
     static const char *const boundaries[] = {"zero", "drop"};
     static const char *const blocks[] = {"free", "all"};
     static const char *const methods[] = {"bem"};
     pliant_status status = PLIANT_OK;
-    int choice = 0, scheme_given = 0;
+    int choice = 0, scheme_given = 0, filling_given = 0;
+    const char *given[KIND_COUNT] = {NULL};
     *action = PLIANT_OPTIONS_RUN;
     optind = 0;  // starts afresh, so that parsing can be tested in one process
     opterr = 0;
@@ -243,6 +244,21 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             status = word("--blocks", optarg, blocks, 2, &choice, err);
             o.blocks = (pliant_blocks)choice;
             break;
+        case OPTION_LATTICE:
+            status = pliant_option_integer("--lattice", optarg, 1, PLIANT_VOXEL_CELL_LIMIT, &o.lattice_cells, err);
+            break;
+        case OPTION_HALF_WIDTH:
+            status = pliant_option_integer("--half-width", optarg, 1, PLIANT_LATTICE_WIDTH_LIMIT, &o.half_width, err);
+            break;
+        case OPTION_SOLID:
+        case OPTION_SHELL:
+            o.filling = code == OPTION_SHELL ? PLIANT_VOXELS_SHELL : PLIANT_VOXELS_SOLID;
+            if (filling_given && filling_given != code)
+                return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--solid and --shell: give one of them");
+            filling_given = code;
+            break;
+        case OPTION_LATTICE_MASS: o.lattice_mass = optarg; break;
+        case OPTION_NO_GREENS: o.greens = PLIANT_GREENS_NONE; break;
         case OPTION_METHOD: status = word("--method", optarg, methods, 1, &choice, err); break;
         case OPTION_YOUNG: status = number("--young", optarg, 0, INFINITY, &o.material.young, err); break;
         case OPTION_POISSON: status = number("--poisson", optarg, -1, 0.5, &o.material.poisson, err); break;
@@ -252,6 +268,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case OPTION_EPS: status = number("--eps", optarg, 0, 1, &o.compression.eps, err); break;
         default: return pliant_option_refuse(code, argc, argv, long_options, err);
         }
+        if (!given[kind_of(code)] && kind_of(code) != KIND_ANY) given[kind_of(code)] = name_of(code);
     }
     if (status < 0) return status;
 
@@ -262,9 +279,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     if (!o.output) return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected -o MODEL.h5; see --help");
     if (o.dense && strcmp(o.dense, o.output) == 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--dense and -o name the same file '%s'", o.dense);
-    if (!o.fixed_expression && !o.fixed_list)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "nothing holds the solid: give --fixed EXPR (such as 'z<0.1') or --fixed-list FILE");
+    if ((status = check_kinds(&o, given, err)) < 0) return status;
     if (o.fixed_expression) {
         // A mistake in the expression is told before a mesh is read: try it on a mesh of nothing.
         const pliant_mesh nothing = {0};

@@ -3,6 +3,7 @@
 
 #include "bem/bem.h"
 #include "compression.h"
+#include "lattice/voxels.h"
 #include "mesh/multires.h"
 
 typedef enum pliant_blocks {
@@ -31,6 +32,11 @@ typedef struct pliant_level_range {
     int32_t first, last;  // -1: from level 0, to the finest
 } pliant_level_range;
 
+typedef enum pliant_greens_wish {
+    PLIANT_GREENS_SOLVE,
+    PLIANT_GREENS_NONE,  // --no-greens: a lattice only
+} pliant_greens_wish;
+
 typedef struct pliant_options {
     const char *mesh, *output, *dense;  // dense NULL: none
     int32_t subdivide;                  // -1: detect the levels of the mesh
@@ -42,6 +48,11 @@ typedef struct pliant_options {
     pliant_compression_def compression;
     pliant_level_range constraint_levels;
     pliant_blocks blocks;
+    int32_t lattice_cells;            // along the longest side; 0: no lattice
+    int32_t half_width;               // of its regions
+    pliant_voxel_filling filling;
+    const char *lattice_mass;         // NULL: the density everywhere
+    pliant_greens_wish greens;
     pliant_reporting reporting;
     pliant_talk talk;
     pliant_existing existing;
@@ -60,5 +71,5 @@ PLIANT_UNUSED_RESULT pliant_status pliant_options_parse(int argc, char **argv,
                                                         pliant_options_action *action,
                                                         pliant_error *err);
 
-// The text of --help; static.
-const char *pliant_options_help(void);
+// The text of --help in parts, then NULL; static.
+extern const char *const pliant_options_help[];

@@ -1,15 +1,12 @@
 // problem.c: the reference boundary value problem: surface, levels, support, domains (GF 3.2.1).
 #include "problem.h"
 
-#include "mesh/mesh_check.h"
-#include "mesh/mesh_file.h"
+#include "input.h"
 #include "mesh/region.h"
-#include "node_memory.h"
 #include "refusal.h"
 
 #include "pliant/error.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -35,78 +32,28 @@ static pliant_status hold_listed(const pliant_multires *multires, int32_t input_
     return status;
 }
 
-// Weights of the limit surface while detail is measured, twelve a vertex on two levels, and faces.
-static const double detail_bytes = 1200;
-
-// A deep subdivision is refused before it is made: the dense system of its vertices is what counts.
-static pliant_status check_size(const pliant_mesh *base, const pliant_options *options, pliant_error *err)
-{
-    // Every level has four faces for one; a closed surface has about half as many vertices as faces.
-    const double detailed = ldexp(base->face_count, 2 * options->subdivide) / 2;
-    const double vertices = ldexp(detailed, -2 * options->detail), available = pliant_node_available();
-    const double needed = 2 * 9 * vertices * vertices * sizeof(double);
-    if (options->detail > 0 && available > 0 && detailed * detail_bytes > available)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY,
-                                "--subdivide %d --detail %d: makes %.3g vertices, which need %.3g GB of "
-                                "memory (%.1f GB are available here): use fewer levels",
-                                options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
-                                available / 1e9);
-    if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_MEMORY,
-                            "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
-                            "memory (%.1f GB are available here): use fewer levels",
-                            options->subdivide, vertices, needed / 1e9, available / 1e9);
-}
-
-// Everything that only one rank needs to do: read, check, refine or detect, take detail off, hold.
+// Everything that only one rank needs to do: read, find levels, hold.
 static pliant_status pose(const pliant_options *options, pliant_progress *progress,
-                          pliant_multires **multires, pliant_relief **relief, uint8_t **held,
-                          pliant_mesh_report *report, pliant_error *err)
+                          pliant_input *input, uint8_t **held, pliant_error *err)
 {
-    pliant_mesh *mesh = NULL;
-    pliant_status status = pliant_mesh_file_read(options->mesh, &mesh, err);
+    pliant_status status = pliant_input_read(options, progress, input, err);
     if (status < 0) return status;
-    const int32_t input_count = mesh->vertex_count;
-    if ((status = pliant_mesh_check(mesh, options->mesh, report, err)) < 0) goto done;
-    if (report->turned_count > 0)
-        pliant_progress_note(progress, "%s: %d faces looked inwards and were turned", options->mesh,
-                             report->turned_count);
-
-    if (options->subdivide >= 0 && (status = check_size(mesh, options, err)) < 0) goto done;
-    status = options->subdivide >= 0
-                 ? pliant_multires_subdivide(mesh, options->subdivide, options->scheme, multires, err)
-                 : pliant_multires_detect(mesh, multires, err);
-    if (status == PLIANT_OK && options->detail > 0)
-        status = pliant_relief_split(multires, options->detail, relief, err);
-    if (status < 0) {
-        // The room of meshes does not know the file's name.
-        const pliant_error inner = *err;
-        status = pliant_error_set(err, status, "%s: %.400s", options->mesh, inner.text);
-        goto done;
-    }
-    if ((*multires)->note.text[0])
-        pliant_progress_note(progress, "%s: %s", options->mesh, (*multires)->note.text);
-    const int32_t n = (*multires)->mesh->vertex_count;
-    *held = calloc((size_t)n, 1);
-    if (!*held) {
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d vertices", n);
-        goto done;
-    }
+    const pliant_mesh *mesh = input->multires->mesh;
+    *held = calloc((size_t)mesh->vertex_count, 1);
+    if (!*held)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d vertices", mesh->vertex_count);
     if (options->fixed_expression) {
-        status = pliant_region_evaluate(options->fixed_expression, (*multires)->mesh, *held, err);
+        status = pliant_region_evaluate(options->fixed_expression, mesh, *held, err);
         if (status < 0) {
             const pliant_error inner = *err;
-            status = pliant_error_set(err, status, "--fixed: %.400s", inner.text);
-            goto done;
+            return pliant_error_set(err, status, "--fixed: %.400s", inner.text);
         }
     }
-    if (options->fixed_list &&
-        (status = hold_listed(*multires, input_count, options->fixed_list, *held, err)) < 0)
-        goto done;
-    status = pliant_region_check((*multires)->mesh, *held, err);
-done:
-    pliant_mesh_destroy(mesh);
-    return status;
+    if (options->fixed_list) {
+        status = hold_listed(input->multires, input->vertex_count, options->fixed_list, *held, err);
+        if (status < 0) return status;
+    }
+    return pliant_region_check(mesh, *held, err);
 }
 
 // Collective: everybody gets the first rank's mesh, levels and held set.
@@ -142,13 +89,6 @@ static PetscErrorCode share(MPI_Comm comm, int rank, pliant_multires **multires,
     PetscFunctionReturn(0);
 }
 
-static uint64_t hash(uint64_t state, const void *bytes, size_t count)
-{
-    // FNV-1a (Fowler, Noll, Vo), 64 bits.
-    for (size_t i = 0; i < count; i++) state = (state ^ ((const unsigned char *)bytes)[i]) * 0x100000001B3ull;
-    return state;
-}
-
 // Domains, areas and transforms, on every rank from the shared mesh.
 static pliant_status derive(pliant_problem *p, const pliant_options *options, pliant_error *err)
 {
@@ -165,8 +105,6 @@ static pliant_status derive(pliant_problem *p, const pliant_options *options, pl
         else p->free_nodes[p->free_count++] = v;
     }
     pliant_mesh_vertex_areas(n, mesh->vertices, mesh->face_count, mesh->faces, p->areas);
-    p->mesh_hash = hash(hash(0xCBF29CE484222325ull, mesh->vertices, 3 * (size_t)n * sizeof(double)),
-                        mesh->faces, 3 * (size_t)mesh->face_count * sizeof(int32_t));
 
     pliant_status status = pliant_hierarchy_create(m->level_count, m->vertex_count, mesh->face_count,
                                                    mesh->faces, m->parents, &p->hierarchy, err);
@@ -194,12 +132,15 @@ PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *option
     pliant_problem *p;
     PetscCall(PetscNew(&p));
     *problem = p;  // from here on destroy frees whatever there is
-    pliant_mesh_report report = {0};
+    pliant_input input = {0};
     pliant_status status = PLIANT_OK;
-    if (rank == 0) status = pose(options, progress, &p->multires, &p->relief, &p->held, &report, err);
+    if (rank == 0) status = pose(options, progress, &input, &p->held, err);
+    p->multires = input.multires;
+    p->relief = input.relief;
+    p->input_count = input.vertex_count;
     PliantCall(comm, status, err);
-    PetscCall(share(comm, rank, &p->multires, &p->held, &report, err));
-    p->component_count = report.component_count;
+    PetscCall(share(comm, rank, &p->multires, &p->held, &input.report, err));
+    p->component_count = input.report.component_count;
     p->levels = options->constraint_levels;
     if (p->levels.first < 0) p->levels = (pliant_level_range){0, p->multires->level_count - 1};
     PliantCall(comm, derive(p, options, err), err);

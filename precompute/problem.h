@@ -12,6 +12,7 @@
 typedef struct pliant_problem {
     pliant_multires *multires;
     pliant_relief *relief;     // --detail: what was taken off the mesh; on the first rank, else NULL
+    int32_t input_count;       // vertices of MESH; on the first rank
     pliant_hierarchy *hierarchy;
     int32_t vertex_count;      // n
     uint8_t *held;             // [n] 1 at fixed nodes
@@ -25,7 +26,6 @@ typedef struct pliant_problem {
     pliant_level_range levels;  // columns asked for: first to last, of levels 0 to L
     double volume;
     int32_t component_count;
-    uint64_t mesh_hash;        // FNV-1a over vertices and faces, of the finest level
 } pliant_problem;
 
 // Collective: the first rank reads and checks the inputs, all ranks get the problem. Notes on what

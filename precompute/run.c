@@ -1,25 +1,22 @@
 // run.c: one precomputation from its options to its file.
 #include "run.h"
 
+#include "input.h"
 #include "model_output.h"
 #include "node_memory.h"
+#include "provenance.h"
 #include "refusal.h"
 #include "right_hand.h"
 
 #include "pliant/error.h"
 
 #include <errno.h>
-#include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
-
-#ifndef PLIANT_REVISION
-#define PLIANT_REVISION "unknown"
-#endif
 
 // The backward error of sampled rows may be this large before it is an error: LU with partial pivoting
 // stays near 1e-15 (measured on the sample and the evaluation meshes) unless the growth of its
@@ -183,56 +180,58 @@ static PetscErrorCode assemble(MPI_Comm comm, const pliant_problem *p, const pli
     PetscFunctionReturn(0);
 }
 
-static void write_provenance(const pliant_run_summary *s, const pliant_problem *p,
-                             const pliant_options *options, const char *command_line, char *text,
-                             size_t size)
-{
-    unsigned major, minor, release;
-    char petsc[128] = "";
-    H5get_libversion(&major, &minor, &release);
-    (void)PetscGetVersion(petsc, sizeof petsc);
-    const char *comma = strchr(petsc, ',');
-    snprintf(text, size,
-             "program = pliant-precompute %s\n"
-             "revision = %s\n"
-             "command_line = %s\n"
-             "mesh = %s\n"
-             "mesh_hash = fnv1a64:%016llx\n"
-             "petsc = %.*s\n"
-             "hdf5 = %u.%u.%u\n"
-             "method = bem\n"
-             "ranks = %d\n"
-             "solver = %s\n"
-             "constraint_levels = %d..%d\n"
-             "asked_eps = %.9g\n"
-             "asked_rms = %.9g\n"
-             "asked_max = %.9g\n"
-             "detail_steps = %d\n"
-             "detail_rms = %.6g\n"
-             "detail_tangential_rms = %.6g\n"
-             "residual = %.3g\n"
-             "seconds_read = %.3f\n"
-             "seconds_assemble = %.3f\n"
-             "seconds_factor = %.3f\n"
-             "seconds_solve = %.3f\n"
-             "seconds_transform = %.3f\n"
-             "seconds_compress = %.3f\n",
-             PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh,
-             (unsigned long long)p->mesh_hash, comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc,
-             major, minor, release, s->ranks, s->solver, s->levels.first, s->levels.last, options->compression.eps,
-             options->compression.rms, options->compression.max, s->detail_steps, s->detail.rms,
-             s->detail.tangential_rms, s->residual, s->times.read,
-             s->times.assemble, s->times.factor, s->times.solve, s->times.transform, s->times.compress);
-}
-
 // What a run holds; freed in reverse whatever happened.
 typedef struct held {
+    pliant_input input;  // of a run without Green's functions
     pliant_problem *problem;
+    pliant_lattice_data *lattice;  // on the first rank
     pliant_dense_system *system;
     pliant_sample_row sample;
     pliant_greens *greens;
     pliant_dense_output *dense;
 } held;
+
+// The first rank's, of any run.
+static pliant_status build_lattice(const pliant_options *options, const pliant_multires *multires,
+                                   int32_t input_count, pliant_progress *progress, pliant_run_summary *s,
+                                   held *h, pliant_error *err)
+{
+    if (options->lattice_cells == 0) return PLIANT_OK;
+    pliant_progress_begin(progress, "lattice", 0);
+    const pliant_status status = pliant_lattice_stage_build(options, multires, input_count, progress,
+                                                            &h->lattice, &s->lattice, err);
+    s->times.lattice = pliant_progress_end(progress);
+    return status;
+}
+
+// A run without Green's functions: the first rank's alone.
+static pliant_status work_alone(const pliant_options *options, const char *command_line,
+                                pliant_progress *progress, pliant_run_summary *s, held *h, pliant_error *err)
+{
+    if (options->fixed_expression || options->fixed_list)
+        pliant_progress_note(progress, "--no-greens: the held vertices are not used");
+    pliant_progress_begin(progress, "read", 0);
+    pliant_status status = pliant_input_read(options, progress, &h->input, err);
+    s->times.read = pliant_progress_end(progress);
+    if (status < 0) return status;
+    const pliant_multires *m = h->input.multires;
+    s->vertex_count = m->mesh->vertex_count;
+    s->face_count = m->mesh->face_count;
+    s->level_count = m->level_count;
+    s->component_count = h->input.report.component_count;
+    s->volume = pliant_mesh_volume(m->mesh);
+    status = build_lattice(options, m, h->input.vertex_count, progress, s, h, err);
+    if (status < 0) return status;
+
+    pliant_progress_begin(progress, "write", 0);
+    char *text = pliant_provenance_text(s, m->mesh, options, command_line);
+    if (!text) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the provenance");
+    status = pliant_lattice_output_file(options->output, m, &options->material, h->lattice, text,
+                                        &s->file_bytes, err);
+    free(text);
+    s->times.write = pliant_progress_end(progress);
+    return status;
+}
 
 static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const char *command_line,
                            pliant_progress *progress, pliant_run_summary *s, held *h, pliant_error *err)
@@ -240,14 +239,7 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     PetscFunctionBegin;
     PetscMPIInt rank;
     PetscCallMPI(MPI_Comm_rank(comm, &rank));
-    PetscCallMPI(MPI_Comm_size(comm, &s->ranks));
-    const double begin = pliant_progress_clock();
     pliant_status status = PLIANT_OK;
-    if (rank == 0) {
-        status = check_output(options->output, options->existing, err);
-        if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
-    }
-    PliantCall(comm, status, err);
     pliant_progress_begin(progress, "read", 0);
     PetscCall(pliant_problem_create(comm, options, progress, &h->problem, err));
     s->times.read = pliant_progress_end(progress);
@@ -271,6 +263,8 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = p->levels.first; l <= p->levels.last; l++)
             s->column_counts[b][l] = pliant_greens_column_count(p, (pliant_block_name)b, l);
+    if (rank == 0) status = build_lattice(options, p->multires, p->input_count, progress, s, h, err);
+    PliantCall(comm, status, err);
 
     char folder[4096];
     spool_folder(options->output, folder, sizeof folder);
@@ -316,18 +310,16 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     memcpy(s->results, h->greens->results, sizeof s->results);
 
     pliant_progress_begin(progress, "write", 0);
-    const size_t text_size = 4096 + strlen(command_line) + strlen(options->mesh);
-    char *text;
-    PetscCall(PetscMalloc1(text_size, &text));
-    write_provenance(s, p, options, command_line, text, text_size);
+    char *text = pliant_provenance_text(s, p->multires->mesh, options, command_line);
     PetscErrorCode code = 0;
-    if (h->dense) code = pliant_dense_output_commit(h->dense, err);
+    if (!text) code = PETSC_ERR_MEM;
+    if (code == 0 && h->dense) code = pliant_dense_output_commit(h->dense, err);
     if (code == 0)
-        code = pliant_model_output_write(options->output, h->greens, options, text, &s->file_bytes, err);
-    PetscCall(PetscFree(text));
+        code = pliant_model_output_write(options->output, h->greens, h->lattice, options, text, &s->file_bytes,
+                                         err);
+    free(text);
     PetscCall(code);
     s->times.write = pliant_progress_end(progress);
-    s->times.total = pliant_progress_clock() - begin;
     PetscFunctionReturn(0);
 }
 
@@ -337,13 +329,29 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     PetscFunctionBegin;
     held h = {0};
     *summary = (pliant_run_summary){.solver = ""};
-    const PetscErrorCode code = work(comm, options, command_line, progress, summary, &h, err);
+    PetscMPIInt rank;
+    PetscCallMPI(MPI_Comm_rank(comm, &rank));
+    PetscCallMPI(MPI_Comm_size(comm, &summary->ranks));
+    const double begin = pliant_progress_clock();
+    pliant_status status = PLIANT_OK;
+    if (rank == 0) {
+        status = check_output(options->output, options->existing, err);
+        if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
+        if (status == PLIANT_OK && options->greens == PLIANT_GREENS_NONE)
+            status = work_alone(options, command_line, progress, summary, &h, err);
+    }
+    PetscErrorCode code = pliant_refusal_agree(comm, status, err);
+    if (code == 0 && options->greens == PLIANT_GREENS_SOLVE)
+        code = work(comm, options, command_line, progress, summary, &h, err);
+    summary->times.total = pliant_progress_clock() - begin;
     PetscCall(pliant_dense_output_destroy(&h.dense));
     PetscCall(pliant_greens_destroy(&h.greens));
     PetscCall(PetscFree(h.sample.right));
     PetscCall(PetscFree(h.sample.A));
     PetscCall(pliant_dense_system_destroy(&h.system));
+    pliant_lattice_data_destroy(h.lattice);
     PetscCall(pliant_problem_destroy(&h.problem));
+    pliant_input_release(&h.input);
     PetscCall(code);
     PetscFunctionReturn(0);
 }

@@ -2,16 +2,18 @@
 #pragma once
 
 #include "greens.h"
+#include "lattice_stage.h"
 
 // Seconds of each phase; the order is the program's.
 typedef struct pliant_run_times {
-    double read, assemble, factor, solve, transform, compress, write, total;
+    double read, lattice, assemble, factor, solve, transform, compress, write, total;
 } pliant_run_times;
 
 typedef struct pliant_run_summary {
     int32_t vertex_count, face_count, level_count, free_count, fixed_count, component_count, ranks;
     int32_t detail_steps, detail_vertex_count;  // 0 without --detail; on the first rank
     pliant_relief_size detail;
+    pliant_lattice_summary lattice;  // 0 cells without --lattice; on the first rank
     const char *solver;            // "node" or "scalapack"
     double volume, residual, memory_bytes, file_bytes;
     pliant_level_range levels;  // stored

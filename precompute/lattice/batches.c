@@ -19,7 +19,7 @@ typedef struct growth {
     int32_t *edge;       // [face_count]: faces beside the batch that are not in one
     int32_t edge_count;
     int32_t face_total, point_total;
-    int32_t points[PLIANT_BATCH_POINTS], point_count;
+    int32_t points[PLIANT_BATCH_LIMIT], point_count;
 } growth;
 
 enum { FACE_OPEN, FACE_AT_EDGE, FACE_TAKEN };
@@ -82,7 +82,7 @@ static void take_free(growth *g)
 static int32_t choose(growth *g, int32_t points[FACE_POINTS], int32_t *count)
 {
     int32_t best = -1, place = 0;
-    *count = PLIANT_BATCH_POINTS - g->point_count + 1;
+    *count = PLIANT_BATCH_LIMIT - g->point_count + 1;
     for (int32_t i = 0; i < g->edge_count; i++) {
         int32_t needed[FACE_POINTS];
         const int32_t n = find_new(g, g->edge[i], needed);
@@ -107,7 +107,7 @@ static void grow(growth *g, int32_t *next)
             while (*next < g->in->face_count && g->face_mark[*next] == FACE_TAKEN) ++*next;
             if (*next == g->in->face_count) return;
             count = find_new(g, *next, points);
-            if (g->point_count + count <= PLIANT_BATCH_POINTS) face = *next;
+            if (g->point_count + count <= PLIANT_BATCH_LIMIT) face = *next;
         }
         if (face < 0) return;
         use(g, points, count);
@@ -131,7 +131,7 @@ static pliant_status make_batches(growth *g, pliant_error *err)
         g->point_count = 0;
         grow(g, &next);
         if ((size_t)(g->point_total + g->point_count) > capacity) {
-            capacity = 2 * capacity + PLIANT_BATCH_POINTS;
+            capacity = 2 * capacity + PLIANT_BATCH_LIMIT;
             int32_t *points = realloc(b->points, capacity * sizeof *points);
             if (!points)
                 return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %zu particles of batches",

@@ -1,13 +1,11 @@
 // batches.h: triangles in groups that need few lattice particles each, for shaders (LSM 4, end).
 //
 // Graphics hardware lets a shaded vertex index a bounded number of positions in constant memory, so
-// every batch of triangles uses at most PLIANT_BATCH_POINTS particles: those at the corners of the
+// every batch of triangles uses at most PLIANT_BATCH_LIMIT particles: those at the corners of the
 // cells that hold its vertices.
 #pragma once
 
-#include "pliant/base.h"
-
-enum { PLIANT_BATCH_POINTS = 128 };
+#include "pliant/sections.h"
 
 typedef struct pliant_batches {
     int32_t batch_count;

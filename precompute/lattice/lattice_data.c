@@ -15,7 +15,7 @@ static void corner_of(const int32_t *cell, int c, int32_t corner[3])
     for (int d = 0; d < 3; d++) corner[d] = cell[d] + (c >> d & 1);
 }
 
-static pliant_status number_particles(pliant_lattice_data *l, pliant_error *err)
+static pliant_status number_particles(pliant_lattice_data *l, const char *name, pliant_error *err)
 {
     const pliant_voxels *v = l->voxels;
     const int32_t dims[3] = {v->grid.dims[0] + 1, v->grid.dims[1] + 1, v->grid.dims[2] + 1};
@@ -31,7 +31,7 @@ static pliant_status number_particles(pliant_lattice_data *l, pliant_error *err)
     l->particle_count = pliant_cell_set_number(set);
     if (l->particle_count > PLIANT_LATTICE_LIMIT) {
         status = pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                  "makes %d particles, expected at most %d: use fewer cells",
+                                  "%s: makes %d particles, expected at most %d: use fewer cells", name,
                                   l->particle_count, PLIANT_LATTICE_LIMIT);
         goto done;
     }
@@ -126,7 +126,7 @@ pliant_status pliant_lattice_data_create(const pliant_lattice_data_def *def, con
     if (!l) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a lattice");
     pliant_status status = pliant_voxels_create(mesh, def->name, def->cells, def->filling,
                                                 def->available, &l->voxels, err);
-    if (status == PLIANT_OK) status = number_particles(l, err);
+    if (status == PLIANT_OK) status = number_particles(l, def->name, err);
     if (status == PLIANT_OK) status = count_components(l, err);
     if (status == PLIANT_OK) status = weigh(l, def, mesh, err);
     if (status == PLIANT_OK) status = find_regions(l, def->half_width, err);

@@ -100,7 +100,7 @@ static void check_batches(const pliant_mesh *mesh, const pliant_lattice_data *l)
         const int32_t *points = b->points + b->point_offset[i];
         const int32_t point_count = b->point_offset[i + 1] - b->point_offset[i];
         assert_true(b->face_offset[i + 1] > b->face_offset[i]);
-        assert_in_range(point_count, 8, PLIANT_BATCH_POINTS);
+        assert_in_range(point_count, 8, PLIANT_BATCH_LIMIT);
         // Exactly the particles that its faces need, ascending.
         int32_t needed = 0;
         for (int32_t f = b->face_offset[i]; f < b->face_offset[i + 1]; f++) {
@@ -241,7 +241,7 @@ static void batches_are_few(void **state)
                sphere.mesh->face_count, cells, b->batch_count,
                (double)b->point_offset[b->batch_count] / b->batch_count,
                (double)b->point_offset[b->batch_count] / used, used);
-        check_at_most(b->batch_count, 2.5 * used / PLIANT_BATCH_POINTS + 4);
+        check_at_most(b->batch_count, 2.5 * used / PLIANT_BATCH_LIMIT + 4);
         pliant_lattice_data_destroy(l);
     }
     check_surface_destroy(&sphere);

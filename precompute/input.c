@@ -1,0 +1,89 @@
+// input.c: the mesh that a run works on: read, checked, and with its levels.
+#include "input.h"
+
+#include "mesh/mesh_file.h"
+#include "node_memory.h"
+
+#include "pliant/error.h"
+
+#include <math.h>
+
+// Weights of the limit surface while detail is measured, twelve a vertex on two levels, and faces.
+static const double detail_bytes = 1200;
+// Positions, faces, twins and parents of a vertex while it is made, embedded and written.
+static const double plain_bytes = 400;
+
+// A deep subdivision is refused before it is made: by the dense system of its vertices, or, where
+// none is solved, by the vertices themselves.
+static pliant_status check_size(const pliant_mesh *base, const pliant_options *options, pliant_error *err)
+{
+    // Every level has four faces for one; a closed surface has about half as many vertices as faces.
+    const double detailed = ldexp(base->face_count, 2 * options->subdivide) / 2;
+    const double vertices = ldexp(detailed, -2 * options->detail), available = pliant_node_available();
+    const double needed = 2 * 9 * vertices * vertices * sizeof(double);
+    if (options->detail > 0 && available > 0 && detailed * detail_bytes > available)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "--subdivide %d --detail %d: makes %.3g vertices, which need %.3g GB of "
+                                "memory (%.1f GB are available here): use fewer levels",
+                                options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
+                                available / 1e9);
+    if (options->greens == PLIANT_GREENS_NONE) {
+        if (available <= 0 || vertices * plain_bytes <= available) return PLIANT_OK;
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "--subdivide %d: makes %.3g vertices, which need %.3g GB of memory (%.1f GB "
+                                "are available here): use fewer levels",
+                                options->subdivide, vertices, vertices * plain_bytes / 1e9, available / 1e9);
+    }
+    if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
+    return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                            "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
+                            "memory (%.1f GB are available here): use fewer levels",
+                            options->subdivide, vertices, needed / 1e9, available / 1e9);
+}
+
+static pliant_status find_levels(const pliant_options *options, const pliant_mesh *mesh,
+                                 pliant_multires **multires, pliant_error *err)
+{
+    if (options->subdivide >= 0)
+        return pliant_multires_subdivide(mesh, options->subdivide, options->scheme, multires, err);
+    if (options->greens == PLIANT_GREENS_NONE)
+        return pliant_multires_subdivide(mesh, 0, PLIANT_SUBDIVIDE_MIDPOINT, multires, err);
+    return pliant_multires_detect(mesh, multires, err);
+}
+
+pliant_status pliant_input_read(const pliant_options *options, pliant_progress *progress,
+                                pliant_input *input, pliant_error *err)
+{
+    pliant_mesh *mesh = NULL;
+    pliant_mesh_report *report = &input->report;
+    pliant_status status = pliant_mesh_file_read(options->mesh, &mesh, err);
+    if (status < 0) return status;
+    input->vertex_count = mesh->vertex_count;
+    if ((status = pliant_mesh_check(mesh, options->mesh, report, err)) < 0) goto done;
+    if (report->turned_count > 0)
+        pliant_progress_note(progress, "%s: %d faces looked inwards and were turned", options->mesh,
+                             report->turned_count);
+
+    if (options->subdivide >= 0 && (status = check_size(mesh, options, err)) < 0) goto done;
+    status = find_levels(options, mesh, &input->multires, err);
+    if (status == PLIANT_OK && options->detail > 0)
+        status = pliant_relief_split(&input->multires, options->detail, &input->relief, err);
+    if (status < 0) {
+        // The room of meshes does not know the file's name.
+        const pliant_error inner = *err;
+        status = pliant_error_set(err, status, "%s: %.400s", options->mesh, inner.text);
+        goto done;
+    }
+    if (input->multires->note.text[0])
+        pliant_progress_note(progress, "%s: %s", options->mesh, input->multires->note.text);
+done:
+    pliant_mesh_destroy(mesh);
+    return status;
+}
+
+void pliant_input_release(pliant_input *input)
+{
+    pliant_relief_destroy(input->relief);
+    pliant_multires_destroy(input->multires);
+    *input = (pliant_input){0};
+}
