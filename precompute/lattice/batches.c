@@ -17,7 +17,8 @@ typedef struct growth {
     uint8_t *face_mark;  // [face_count]: see the enum below
     uint8_t *point_used; // [particle_count]: 1 in this batch
     int32_t *edge;       // [face_count]: faces beside the batch that are not in one
-    int32_t edge_count;
+    int32_t *age;        // [face_count]: when a face came to the edge
+    int32_t edge_count, clock;
     int32_t face_total, point_total;
     int32_t points[PLIANT_BATCH_LIMIT], point_count;
 } growth;
@@ -51,6 +52,7 @@ static void take(growth *g, int32_t face)
         if (g->face_mark[beside] != FACE_OPEN) continue;
         g->face_mark[beside] = FACE_AT_EDGE;
         g->edge[g->edge_count++] = beside;
+        g->age[beside] = g->clock++;
     }
 }
 
@@ -86,7 +88,7 @@ static int32_t choose(growth *g, int32_t points[FACE_POINTS], int32_t *count)
     for (int32_t i = 0; i < g->edge_count; i++) {
         int32_t needed[FACE_POINTS];
         const int32_t n = find_new(g, g->edge[i], needed);
-        if (n > *count || (n == *count && (best < 0 || g->edge[i] > best))) continue;
+        if (n > *count || (n == *count && (best < 0 || g->age[g->edge[i]] > g->age[best]))) continue;
         best = g->edge[i];
         place = i;
         *count = n;
@@ -161,19 +163,21 @@ pliant_status pliant_batches_create(const pliant_batches_input *input, pliant_ba
     g.face_mark = calloc(faces, 1);
     g.point_used = calloc((size_t)input->particle_count, 1);
     g.edge = malloc(faces * sizeof *g.edge);
+    g.age = malloc(faces * sizeof *g.age);
     if (g.out) {
         g.out->face_offset = calloc(faces + 1, sizeof *g.out->face_offset);
         g.out->point_offset = calloc(faces + 1, sizeof *g.out->point_offset);
         g.out->faces = malloc(faces * sizeof *g.out->faces);
     }
     pliant_status status = PLIANT_OK;
-    if (!g.twin || !g.face_mark || !g.point_used || !g.edge || !g.out || !g.out->face_offset ||
+    if (!g.twin || !g.face_mark || !g.point_used || !g.edge || !g.age || !g.out || !g.out->face_offset ||
         !g.out->point_offset || !g.out->faces)
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for batches of %d faces",
                                   input->face_count);
     if (status == PLIANT_OK)
         status = pliant_halfedge_match(input->vertex_count, input->face_count, input->faces, g.twin, err);
     if (status == PLIANT_OK) status = make_batches(&g, err);
+    free(g.age);
     free(g.edge);
     free(g.point_used);
     free(g.face_mark);
