@@ -15,30 +15,36 @@ static const double plain_bytes = 400;
 
 // A deep subdivision is refused before it is made: by the dense system of its vertices, or, where
 // none is solved, by the vertices themselves.
-static pliant_status check_size(const pliant_mesh *base, const pliant_options *options, pliant_error *err)
+static pliant_status check_size(const pliant_mesh *base, const pliant_options *options,
+                                pliant_error *err)
 {
-    // Every level has four faces for one; a closed surface has about half as many vertices as faces.
+    // Every level has four faces for one; a closed surface has about half as many vertices as
+    // faces.
     const double detailed = ldexp(base->face_count, 2 * options->subdivide) / 2;
-    const double vertices = ldexp(detailed, -2 * options->detail), available = pliant_node_available();
+    const double vertices = ldexp(detailed, -2 * options->detail),
+                 available = pliant_node_available();
     const double needed = 2 * 9 * vertices * vertices * sizeof(double);
     if (options->detail > 0 && available > 0 && detailed * detail_bytes > available)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY,
-                                "--subdivide %d --detail %d: makes %.3g vertices, which need %.3g GB of "
-                                "memory (%.1f GB are available here): use fewer levels",
-                                options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
-                                available / 1e9);
+        return pliant_error_set(
+            err, PLIANT_ERR_MEMORY,
+            "--subdivide %d --detail %d: makes %.3g vertices, which need %.3g GB of "
+            "memory (%.1f GB are available here): use fewer levels",
+            options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
+            available / 1e9);
     if (options->greens == PLIANT_GREENS_NONE) {
         if (available <= 0 || vertices * plain_bytes <= available) return PLIANT_OK;
-        return pliant_error_set(err, PLIANT_ERR_MEMORY,
-                                "--subdivide %d: makes %.3g vertices, which need %.3g GB of memory (%.1f GB "
-                                "are available here): use fewer levels",
-                                options->subdivide, vertices, vertices * plain_bytes / 1e9, available / 1e9);
+        return pliant_error_set(
+            err, PLIANT_ERR_MEMORY,
+            "--subdivide %d: makes %.3g vertices, which need %.3g GB of memory (%.1f GB "
+            "are available here): use fewer levels",
+            options->subdivide, vertices, vertices * plain_bytes / 1e9, available / 1e9);
     }
     if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_MEMORY,
-                            "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
-                            "memory (%.1f GB are available here): use fewer levels",
-                            options->subdivide, vertices, needed / 1e9, available / 1e9);
+    return pliant_error_set(
+        err, PLIANT_ERR_MEMORY,
+        "--subdivide %d: makes %.3g vertices, whose dense system needs %.3g GB of "
+        "memory (%.1f GB are available here): use fewer levels",
+        options->subdivide, vertices, needed / 1e9, available / 1e9);
 }
 
 static pliant_status find_levels(const pliant_options *options, const pliant_mesh *mesh,

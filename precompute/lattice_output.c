@@ -25,12 +25,9 @@ pliant_status pliant_surface_output_write(pliant_writer *writer, const pliant_mu
 {
     const double constants[3] = {material->young, material->poisson, material->density};
     const section sections[] = {
-        {"/mesh/vertices", multires->mesh->vertices},
-        {"/mesh/faces", multires->mesh->faces},
-        {"/mesh/level_count", multires->vertex_count},
-        {"/mesh/parents", multires->parents},
-        {"/mesh/source_index", multires->source_index},
-        {"/material", constants},
+        {"/mesh/vertices", multires->mesh->vertices},   {"/mesh/faces", multires->mesh->faces},
+        {"/mesh/level_count", multires->vertex_count},  {"/mesh/parents", multires->parents},
+        {"/mesh/source_index", multires->source_index}, {"/material", constants},
     };
     return write_sections(writer, sections, sizeof sections / sizeof *sections, err);
 }

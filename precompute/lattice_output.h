@@ -22,9 +22,6 @@ PLIANT_UNUSED_RESULT pliant_status pliant_lattice_output_write(pliant_writer *wr
 
 // A file without Green's functions: mesh, material, lattice and provenance ("key = value" lines).
 // Nothing stands under `path` until the file is whole. *bytes is its size.
-PLIANT_UNUSED_RESULT pliant_status pliant_lattice_output_file(const char *path,
-                                                              const pliant_multires *multires,
-                                                              const pliant_material *material,
-                                                              const pliant_lattice_data *lattice,
-                                                              const char *provenance, double *bytes,
-                                                              pliant_error *err);
+PLIANT_UNUSED_RESULT pliant_status pliant_lattice_output_file(
+    const char *path, const pliant_multires *multires, const pliant_material *material,
+    const pliant_lattice_data *lattice, const char *provenance, double *bytes, pliant_error *err);

@@ -19,7 +19,8 @@ static pliant_status read_densities(const pliant_options *options, const pliant_
     *densities = malloc((size_t)n * sizeof **densities);
     pliant_status status = PLIANT_OK;
     if (!listed || !*densities)
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d densities", input_count);
+        status =
+            pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d densities", input_count);
     if (status == PLIANT_OK)
         status = pliant_masses_read(options->lattice_mass, input_count, listed, err);
     for (int32_t v = 0; v < n && status == PLIANT_OK; v++) {
@@ -68,7 +69,8 @@ pliant_status pliant_lattice_stage_build(const pliant_options *options,
     free(densities);
     if (status < 0) return status;
     *summary = summarise(*lattice);
-    pliant_progress_note(progress, "lattice of %d x %d x %d cells: %d of them, %d particles, %d regions",
+    pliant_progress_note(progress,
+                         "lattice of %d x %d x %d cells: %d of them, %d particles, %d regions",
                          summary->dims[0], summary->dims[1], summary->dims[2], summary->cells,
                          summary->particles, summary->regions);
     return PLIANT_OK;

@@ -16,10 +16,7 @@ typedef struct pliant_lattice_summary {
 
 // Build it on the mesh's finest level. `input_count` is the number of MESH's vertices, for
 // --lattice-mass: its densities count where a vertex of the finest level is one of MESH.
-PLIANT_UNUSED_RESULT pliant_status pliant_lattice_stage_build(const pliant_options *options,
-                                                              const pliant_multires *multires,
-                                                              int32_t input_count,
-                                                              pliant_progress *progress,
-                                                              pliant_lattice_data **lattice,
-                                                              pliant_lattice_summary *summary,
-                                                              pliant_error *err);
+PLIANT_UNUSED_RESULT pliant_status pliant_lattice_stage_build(
+    const pliant_options *options, const pliant_multires *multires, int32_t input_count,
+    pliant_progress *progress, pliant_lattice_data **lattice, pliant_lattice_summary *summary,
+    pliant_error *err);

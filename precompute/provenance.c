@@ -16,16 +16,17 @@ enum { FIXED_TEXT = 4096 };
 static uint64_t hash(uint64_t state, const void *bytes, size_t count)
 {
     // FNV-1a (Fowler, Noll, Vo), 64 bits.
-    for (size_t i = 0; i < count; i++) state = (state ^ ((const unsigned char *)bytes)[i]) * 0x100000001B3ull;
+    for (size_t i = 0; i < count; i++)
+        state = (state ^ ((const unsigned char *)bytes)[i]) * 0x100000001B3ull;
     return state;
 }
 
 static void print_run(FILE *out, const pliant_run_summary *s, const pliant_mesh *mesh,
                       const pliant_options *options, const char *command_line)
 {
-    const uint64_t mesh_hash =
-        hash(hash(0xCBF29CE484222325ull, mesh->vertices, 3 * (size_t)mesh->vertex_count * sizeof(double)),
-             mesh->faces, 3 * (size_t)mesh->face_count * sizeof(int32_t));
+    const uint64_t mesh_hash = hash(hash(0xCBF29CE484222325ull, mesh->vertices,
+                                         3 * (size_t)mesh->vertex_count * sizeof(double)),
+                                    mesh->faces, 3 * (size_t)mesh->face_count * sizeof(int32_t));
     unsigned major, minor, release;
     char petsc[128] = "";
     H5get_libversion(&major, &minor, &release);
@@ -41,9 +42,9 @@ static void print_run(FILE *out, const pliant_run_summary *s, const pliant_mesh 
             "hdf5 = %u.%u.%u\n"
             "ranks = %d\n"
             "seconds_read = %.3f\n",
-            PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh, (unsigned long long)mesh_hash,
-            comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc, major, minor, release, s->ranks,
-            s->times.read);
+            PLIANT_VERSION_TEXT, PLIANT_REVISION, command_line, options->mesh,
+            (unsigned long long)mesh_hash, comma ? (int)(comma - petsc) : (int)strlen(petsc), petsc,
+            major, minor, release, s->ranks, s->times.read);
 }
 
 static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_options *options)
@@ -64,9 +65,10 @@ static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_op
             "seconds_solve = %.3f\n"
             "seconds_transform = %.3f\n"
             "seconds_compress = %.3f\n",
-            s->solver, s->levels.first, s->levels.last, options->compression.eps, options->compression.rms,
-            options->compression.max, s->detail_steps, s->detail.rms, s->detail.tangential_rms, s->residual,
-            s->times.assemble, s->times.factor, s->times.solve, s->times.transform, s->times.compress);
+            s->solver, s->levels.first, s->levels.last, options->compression.eps,
+            options->compression.rms, options->compression.max, s->detail_steps, s->detail.rms,
+            s->detail.tangential_rms, s->residual, s->times.assemble, s->times.factor,
+            s->times.solve, s->times.transform, s->times.compress);
 }
 
 static void print_lattice(FILE *out, const pliant_run_summary *s, const pliant_options *options)

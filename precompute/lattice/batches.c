@@ -13,11 +13,11 @@ enum { FACE_POINTS = 24 };
 typedef struct growth {
     const pliant_batches_input *in;
     pliant_batches *out;
-    int32_t *twin;       // [3 face_count]
-    uint8_t *face_mark;  // [face_count]: see the enum below
-    uint8_t *point_used; // [particle_count]: 1 in this batch
-    int32_t *edge;       // [face_count]: faces beside the batch that are not in one
-    int32_t *age;        // [face_count]: when a face came to the edge
+    int32_t *twin;        // [3 face_count]
+    uint8_t *face_mark;   // [face_count]: see the enum below
+    uint8_t *point_used;  // [particle_count]: 1 in this batch
+    int32_t *edge;        // [face_count]: faces beside the batch that are not in one
+    int32_t *age;         // [face_count]: when a face came to the edge
     int32_t edge_count, clock;
     int32_t face_total, point_total;
     int32_t points[PLIANT_BATCH_LIMIT], point_count;
@@ -88,7 +88,8 @@ static int32_t choose(growth *g, int32_t points[FACE_POINTS], int32_t *count)
     for (int32_t i = 0; i < g->edge_count; i++) {
         int32_t needed[FACE_POINTS];
         const int32_t n = find_new(g, g->edge[i], needed);
-        if (n > *count || (n == *count && (best < 0 || g->age[g->edge[i]] > g->age[best]))) continue;
+        if (n > *count || (n == *count && (best < 0 || g->age[g->edge[i]] > g->age[best])))
+            continue;
         best = g->edge[i];
         place = i;
         *count = n;
@@ -136,8 +137,8 @@ static pliant_status make_batches(growth *g, pliant_error *err)
             capacity = 2 * capacity + PLIANT_BATCH_LIMIT;
             int32_t *points = realloc(b->points, capacity * sizeof *points);
             if (!points)
-                return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %zu particles of batches",
-                                        capacity);
+                return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                        "no memory for %zu particles of batches", capacity);
             b->points = points;
         }
         const int32_t first = b->face_offset[b->batch_count];
@@ -170,12 +171,13 @@ pliant_status pliant_batches_create(const pliant_batches_input *input, pliant_ba
         g.out->faces = malloc(faces * sizeof *g.out->faces);
     }
     pliant_status status = PLIANT_OK;
-    if (!g.twin || !g.face_mark || !g.point_used || !g.edge || !g.age || !g.out || !g.out->face_offset ||
-        !g.out->point_offset || !g.out->faces)
+    if (!g.twin || !g.face_mark || !g.point_used || !g.edge || !g.age || !g.out ||
+        !g.out->face_offset || !g.out->point_offset || !g.out->faces)
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for batches of %d faces",
                                   input->face_count);
     if (status == PLIANT_OK)
-        status = pliant_halfedge_match(input->vertex_count, input->face_count, input->faces, g.twin, err);
+        status = pliant_halfedge_match(input->vertex_count, input->face_count, input->faces, g.twin,
+                                       err);
     if (status == PLIANT_OK) status = make_batches(&g, err);
     free(g.age);
     free(g.edge);

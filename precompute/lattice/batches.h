@@ -17,9 +17,9 @@ typedef struct pliant_batches {
 
 // Greedily: a batch begins with the least face that has none yet, and grows by the face beside it
 // that needs the fewest new particles, of several the one that has been beside it for longest; when
-// no neighbour fits any more, it is full, and when there are no neighbours it goes on with the least
-// face of another component. Most batches are full to a few particles; on closed surfaces all of
-// them together name each particle twice. (Beginning beside the last batch made no fewer.)
+// no neighbour fits any more, it is full, and when there are no neighbours it goes on with the
+// least face of another component. Most batches are full to a few particles; on closed surfaces all
+// of them together name each particle twice. (Beginning beside the last batch made no fewer.)
 //   vertex_cell  [vertex_count]       the cell that holds a vertex
 //   corners      [cell_count][8]      its particles, of 0 .. particle_count - 1
 // The faces are those of a closed surface (as pliant_halfedge_match accepts them).

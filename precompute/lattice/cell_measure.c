@@ -1,8 +1,8 @@
 // cell_measure.c: how much of a solid, and of its surface, lies in each cell of a grid.
 //
 // Faces are cut along the planes between cells, and the divergence theorem is used along x in each
-// row of cells: behind a piece of surface the solid fills, or stops filling, the piece's shadow, and
-// in the piece's own cell i as much of it as is between the piece and the cell's far side,
+// row of cells: behind a piece of surface the solid fills, or stops filling, the piece's shadow,
+// and in the piece's own cell i as much of it as is between the piece and the cell's far side,
 //     V_i = sum_{pieces p in cells j < i} A_p + sum_{pieces p in i} A_p (i + 1 - x_p),
 //     A_p = -(area vector of p)_x,  x_p: x of its centroid
 // in units of a cell. Exact but for rounding: nothing is sampled. Pieces are made by halving a

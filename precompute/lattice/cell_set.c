@@ -16,7 +16,8 @@ double pliant_cell_set_bytes(const int32_t dims[3])
     return rows * words_of(dims[0]) * sizeof(uint64_t) + (rows + 1) * sizeof(int32_t);
 }
 
-pliant_status pliant_cell_set_create(const int32_t dims[3], pliant_cell_set **set, pliant_error *err)
+pliant_status pliant_cell_set_create(const int32_t dims[3], pliant_cell_set **set,
+                                     pliant_error *err)
 {
     pliant_cell_set *s = calloc(1, sizeof *s);
     const size_t rows = (size_t)dims[1] * (size_t)dims[2];
@@ -28,8 +29,9 @@ pliant_status pliant_cell_set_create(const int32_t dims[3], pliant_cell_set **se
     }
     if (!s || !s->bits || !s->row_first) {
         pliant_cell_set_destroy(s);
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a grid of %d x %d x %d cells",
-                                dims[0], dims[1], dims[2]);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY,
+                                "no memory for a grid of %d x %d x %d cells", dims[0], dims[1],
+                                dims[2]);
     }
     *set = s;
     return PLIANT_OK;

@@ -6,10 +6,10 @@
 #include <stddef.h>
 
 typedef struct pliant_cell_set {
-    int32_t dims[3];       // cells along x, y, z, each 1 .. 1024
-    int32_t word_count;    // words to a row along x
-    uint64_t *bits;        // shape [dims[2]][dims[1]][word_count]; none set beyond dims[0]
-    int32_t *row_first;    // shape [dims[2] * dims[1] + 1]: members before a row; see number
+    int32_t dims[3];     // cells along x, y, z, each 1 .. 1024
+    int32_t word_count;  // words to a row along x
+    uint64_t *bits;      // shape [dims[2]][dims[1]][word_count]; none set beyond dims[0]
+    int32_t *row_first;  // shape [dims[2] * dims[1] + 1]: members before a row; see number
 } pliant_cell_set;
 
 // Bytes that a set takes, for deciding before there is one.

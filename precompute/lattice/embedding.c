@@ -27,7 +27,8 @@ static void face_normal(const pliant_mesh *mesh, int32_t face, double n[3])
 {
     const double *x[3];
     double e[3], f[3];
-    for (int c = 0; c < 3; c++) x[c] = mesh->vertices + 3 * (size_t)mesh->faces[3 * (size_t)face + c];
+    for (int c = 0; c < 3; c++)
+        x[c] = mesh->vertices + 3 * (size_t)mesh->faces[3 * (size_t)face + c];
     for (int d = 0; d < 3; d++) {
         e[d] = x[1][d] - x[0][d];
         f[d] = x[2][d] - x[0][d];
@@ -130,8 +131,9 @@ pliant_status pliant_embedding_create(const pliant_mesh *mesh, const pliant_voxe
     for (size_t v = 0; v < n && status == PLIANT_OK; v++) {
         e->cell[v] = hold(voxels, mesh->vertices + 3 * v, e->offset + 3 * v);
         if (e->cell[v] < 0)
-            status = pliant_error_set(err, PLIANT_ERR_FORMAT,
-                                      "vertex %zu lies in no cell: the mesh is not the voxels' own", v);
+            status =
+                pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                 "vertex %zu lies in no cell: the mesh is not the voxels' own", v);
         find_tangents(normals + 3 * v, e->tangents + 6 * v);
     }
 done:

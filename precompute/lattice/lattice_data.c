@@ -31,15 +31,16 @@ static pliant_status number_particles(pliant_lattice_data *l, const char *name, 
     l->particle_count = pliant_cell_set_number(set);
     if (l->particle_count > PLIANT_LATTICE_LIMIT) {
         status = pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                  "%s: makes %d particles, expected at most %d: use fewer cells", name,
-                                  l->particle_count, PLIANT_LATTICE_LIMIT);
+                                  "%s: makes %d particles, expected at most %d: use fewer cells",
+                                  name, l->particle_count, PLIANT_LATTICE_LIMIT);
         goto done;
     }
     l->particles = malloc(3 * (size_t)l->particle_count * sizeof *l->particles);
     l->corners = malloc(8 * (size_t)v->cell_count * sizeof *l->corners);
     l->mass = malloc((size_t)l->particle_count * sizeof *l->mass);
     if (!l->particles || !l->corners || !l->mass) {
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles", l->particle_count);
+        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles",
+                                  l->particle_count);
         goto done;
     }
     pliant_cell_set_list(set, l->particles);
@@ -56,8 +57,7 @@ done:
 
 static int32_t root_of(int32_t *parent, int32_t particle)
 {
-    while (parent[particle] != particle)
-        particle = parent[particle] = parent[parent[particle]];
+    while (parent[particle] != particle) particle = parent[particle] = parent[parent[particle]];
     return particle;
 }
 
@@ -65,7 +65,8 @@ static pliant_status count_components(pliant_lattice_data *l, pliant_error *err)
 {
     int32_t *parent = malloc((size_t)l->particle_count * sizeof *parent);
     if (!parent)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles", l->particle_count);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles",
+                                l->particle_count);
     for (int32_t i = 0; i < l->particle_count; i++) parent[i] = i;
     l->component_count = l->particle_count;
     for (int32_t i = 0; i < l->voxels->cell_count; i++)
@@ -87,7 +88,8 @@ static pliant_status weigh(pliant_lattice_data *l, const pliant_lattice_data_def
 {
     double *share = malloc((size_t)l->particle_count * sizeof *share);
     if (!share)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles", l->particle_count);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d particles",
+                                l->particle_count);
     pliant_status status =
         pliant_masses_share(mesh, l->voxels, l->corners, l->particle_count, share, err);
     if (status == PLIANT_OK)
@@ -108,7 +110,8 @@ static pliant_status find_regions(pliant_lattice_data *l, int32_t half_width, pl
     return pliant_regions_create(&shape, half_width, &l->regions, err);
 }
 
-static pliant_status find_batches(pliant_lattice_data *l, const pliant_mesh *mesh, pliant_error *err)
+static pliant_status find_batches(pliant_lattice_data *l, const pliant_mesh *mesh,
+                                  pliant_error *err)
 {
     const pliant_batches_input input = {.vertex_count = mesh->vertex_count,
                                         .face_count = mesh->face_count,
@@ -119,8 +122,9 @@ static pliant_status find_batches(pliant_lattice_data *l, const pliant_mesh *mes
     return pliant_batches_create(&input, &l->batches, err);
 }
 
-pliant_status pliant_lattice_data_create(const pliant_lattice_data_def *def, const pliant_mesh *mesh,
-                                         pliant_lattice_data **data, pliant_error *err)
+pliant_status pliant_lattice_data_create(const pliant_lattice_data_def *def,
+                                         const pliant_mesh *mesh, pliant_lattice_data **data,
+                                         pliant_error *err)
 {
     pliant_lattice_data *l = calloc(1, sizeof *l);
     if (!l) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a lattice");

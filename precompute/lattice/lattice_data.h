@@ -8,20 +8,20 @@
 #include "pliant/regions.h"
 
 typedef struct pliant_lattice_data_def {
-    const char *name;             // the mesh's, for messages
-    int32_t cells;                // along the longest side
-    int32_t half_width;           // w, 1 .. PLIANT_LATTICE_WIDTH_LIMIT
+    const char *name;    // the mesh's, for messages
+    int32_t cells;       // along the longest side
+    int32_t half_width;  // w, 1 .. PLIANT_LATTICE_WIDTH_LIMIT
     pliant_voxel_filling filling;
-    double density;               // kg/m^3
-    const double *densities;      // shape [vertex_count], NAN where not known; NULL: `density`
-    double available;             // bytes that may be taken; 0: any number
+    double density;           // kg/m^3
+    const double *densities;  // shape [vertex_count], NAN where not known; NULL: `density`
+    double available;         // bytes that may be taken; 0: any number
 } pliant_lattice_data_def;
 
 typedef struct pliant_lattice_data {
     pliant_voxels *voxels;
     int32_t particle_count;
-    int32_t *particles;       // shape [particle_count][3], ascending by (z, y, x)
-    int32_t *corners;         // shape [voxels->cell_count][8]: particles; bit 0 of 8: x + 1, 1: y, 2: z
+    int32_t *particles;  // shape [particle_count][3], ascending by (z, y, x)
+    int32_t *corners;    // shape [voxels->cell_count][8]: particles; bit 0 of 8: x + 1, 1: y, 2: z
     int32_t component_count;  // connected by shared particles
     float *mass;              // shape [particle_count], kg
     double total_mass;        // kg, the sum of `mass`

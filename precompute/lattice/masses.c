@@ -26,7 +26,8 @@ pliant_status pliant_masses_share(const pliant_mesh *mesh, const pliant_voxels *
     double *area = malloc((size_t)cell_count * sizeof *area);
     pliant_status status = PLIANT_OK;
     if (!volume || !area)
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory to share out %d cells", cell_count);
+        status =
+            pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory to share out %d cells", cell_count);
     if (status == PLIANT_OK) status = pliant_cell_measure(mesh, voxels, volume, area, err);
     if (status < 0) goto done;
     const double *measure = voxels->filling == PLIANT_VOXELS_SOLID ? volume : area;
@@ -54,14 +55,16 @@ static pliant_status gather_known(const pliant_mesh *mesh, const double *densiti
     *vertices = malloc(room * sizeof **vertices);
     *count = 0;
     if (!*points || !*vertices)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d densities", mesh->vertex_count);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d densities",
+                                mesh->vertex_count);
     for (int32_t v = 0; v < mesh->vertex_count; v++) {
         if (isnan(densities[v])) continue;
         memcpy(*points + 3 * (size_t)*count, mesh->vertices + 3 * (size_t)v, 3 * sizeof **points);
         (*vertices)[(*count)++] = v;
     }
     if (*count > 0) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected a density of some vertex, found none");
+    return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                            "expected a density of some vertex, found none");
 }
 
 pliant_status pliant_masses_weigh(const pliant_mesh *mesh, const pliant_voxel_grid *grid,
@@ -89,8 +92,8 @@ pliant_status pliant_masses_weigh(const pliant_mesh *mesh, const pliant_voxel_gr
         const double exact = here * share[i];
         if (!(exact >= FLT_MIN && exact <= FLT_MAX))
             status = pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                      "particle %d of %d weighs %g: expected a mass from %g to %g", i,
-                                      particle_count, exact, FLT_MIN, FLT_MAX);
+                                      "particle %d of %d weighs %g: expected a mass from %g to %g",
+                                      i, particle_count, exact, FLT_MIN, FLT_MAX);
         else *total += mass[i] = (float)exact;
     }
     pliant_nearest_destroy(nearest);
@@ -101,8 +104,8 @@ pliant_status pliant_masses_weigh(const pliant_mesh *mesh, const pliant_voxel_gr
 
 // ---- Files ----
 
-static pliant_status parse_densities(const char *name, pliant_file_bytes bytes, int32_t vertex_count,
-                                     double *densities, pliant_error *err)
+static pliant_status parse_densities(const char *name, pliant_file_bytes bytes,
+                                     int32_t vertex_count, double *densities, pliant_error *err)
 {
     pliant_text_cursor cursor = pliant_text_cursor_begin(name, bytes.data, bytes.size);
     cursor.comment = '#';
@@ -118,8 +121,9 @@ static pliant_status parse_densities(const char *name, pliant_file_bytes bytes, 
         }
     } while (pliant_text_cursor_line(&cursor));
     if (count == vertex_count) return PLIANT_OK;
-    return pliant_error_set(err, PLIANT_ERR_FORMAT, "%s: expected %d densities, one a vertex, found %lld",
-                            name, vertex_count, (long long)count);
+    return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                            "%s: expected %d densities, one a vertex, found %lld", name,
+                            vertex_count, (long long)count);
 }
 
 pliant_status pliant_masses_read(const char *path, int32_t vertex_count, double *densities,

@@ -22,13 +22,10 @@ PLIANT_UNUSED_RESULT pliant_status pliant_masses_share(const pliant_mesh *mesh,
 // [mesh->vertex_count]; NAN: not known there; NULL: `density` everywhere) a particle takes that of
 // the nearest vertex that has one. `particles` has shape [particle_count][3], grid coordinates.
 // PLIANT_ERR_ARGUMENT: a mass that is no normal float, with the number.
-PLIANT_UNUSED_RESULT pliant_status pliant_masses_weigh(const pliant_mesh *mesh,
-                                                       const pliant_voxel_grid *grid,
-                                                       int32_t particle_count,
-                                                       const int32_t *particles,
-                                                       const double *share, double density,
-                                                       const double *densities, float *mass,
-                                                       double *total, pliant_error *err);
+PLIANT_UNUSED_RESULT pliant_status
+pliant_masses_weigh(const pliant_mesh *mesh, const pliant_voxel_grid *grid, int32_t particle_count,
+                    const int32_t *particles, const double *share, double density,
+                    const double *densities, float *mass, double *total, pliant_error *err);
 
 // Read --lattice-mass: white-space separated densities over 0, one a vertex of the input in its
 // order, # comments; `densities` has shape [vertex_count]. Messages give file, line and column.

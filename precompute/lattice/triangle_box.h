@@ -15,9 +15,9 @@
 #define PLIANT_TRIANGLE_SLACK 0x1p-34
 
 typedef struct pliant_triangle_box {
-    int32_t first[3], last[3];      // cells of the triangle's own box, cut to the grid
-    double axis[10][3];             // nine products of edges and the box's axes, and the normal
-    double low[10], high[10];       // the triangle's projections on them, relative to `first`
+    int32_t first[3], last[3];  // cells of the triangle's own box, cut to the grid
+    double axis[10][3];         // nine products of edges and the box's axes, and the normal
+    double low[10], high[10];   // the triangle's projections on them, relative to `first`
     double slack[10];
 } pliant_triangle_box;
 

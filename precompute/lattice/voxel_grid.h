@@ -14,10 +14,10 @@ typedef struct pliant_voxel_grid {
     int32_t dims[3];   // cells along x, y, z
 } pliant_voxel_grid;
 
-// A grid centred on the mesh's bounding box: `cell_count` (1 .. PLIANT_VOXEL_CELL_LIMIT) cells along
-// its longest side, as many as it takes along the others, at least one. The cells are larger by two
-// millionths than the longest side asks for, so that the faces of the bounding box lie inside the
-// outermost cells instead of between them and others.
+// A grid centred on the mesh's bounding box: `cell_count` (1 .. PLIANT_VOXEL_CELL_LIMIT) cells
+// along its longest side, as many as it takes along the others, at least one. The cells are larger
+// by two millionths than the longest side asks for, so that the faces of the bounding box lie
+// inside the outermost cells instead of between them and others.
 pliant_voxel_grid pliant_voxel_grid_place(const pliant_mesh *mesh, int32_t cell_count);
 
 // Grid coordinates of a position: (x - origin) / size. Everything that goes from positions to cells
@@ -25,8 +25,7 @@ pliant_voxel_grid pliant_voxel_grid_place(const pliant_mesh *mesh, int32_t cell_
 static inline void pliant_voxel_grid_locate(const pliant_voxel_grid *grid, const double position[3],
                                             double coordinates[3])
 {
-    for (int d = 0; d < 3; d++)
-        coordinates[d] = (position[d] - grid->origin[d]) / grid->size;
+    for (int d = 0; d < 3; d++) coordinates[d] = (position[d] - grid->origin[d]) / grid->size;
 }
 
 // The corners of a face in grid coordinates.

@@ -148,7 +148,8 @@ static pliant_status flood_outside(const pliant_cell_set *wall, pliant_cell_set 
             const uint64_t *blocked = pliant_cell_set_row(wall, y, z);
             const int is_outer = y == 0 || z == 0 || y == ny - 1 || z == nz - 1;
             if (is_outer)
-                for (int32_t w = 0; w < wall->word_count; w++) row[w] = pliant_cell_set_mask(wall, w);
+                for (int32_t w = 0; w < wall->word_count; w++)
+                    row[w] = pliant_cell_set_mask(wall, w);
             pliant_cell_set_insert(flood, 0, y, z);
             pliant_cell_set_insert(flood, wall->dims[0] - 1, y, z);
             for (int32_t w = 0; w < wall->word_count; w++) row[w] &= ~blocked[w];

@@ -27,8 +27,7 @@ typedef struct pliant_voxels {
 // longest side. `name` is for messages. What needs more than `available` bytes (0: any number) is
 // refused before it is allocated, with PLIANT_ERR_MEMORY and both numbers.
 PLIANT_UNUSED_RESULT pliant_status pliant_voxels_create(const pliant_mesh *mesh, const char *name,
-                                                        int32_t cells,
-                                                        pliant_voxel_filling filling,
+                                                        int32_t cells, pliant_voxel_filling filling,
                                                         double available, pliant_voxels **voxels,
                                                         pliant_error *err);
 void pliant_voxels_destroy(pliant_voxels *voxels);  // NULL is fine

@@ -14,8 +14,8 @@
 static pliant_lattice_data *lattice_of(const pliant_mesh *mesh, int32_t cells, int32_t half_width,
                                        pliant_voxel_filling filling)
 {
-    const pliant_lattice_data_def def = {.name = "mesh", .cells = cells, .half_width = half_width,
-                                         .filling = filling, .density = 1};
+    const pliant_lattice_data_def def = {
+        .name = "mesh", .cells = cells, .half_width = half_width, .filling = filling, .density = 1};
     pliant_lattice_data *l = NULL;
     pliant_error err = {""};
     check_ok(pliant_lattice_data_create(&def, mesh, &l, &err), &err);
@@ -28,7 +28,8 @@ static void check_particles(const pliant_lattice_data *l)
     const pliant_voxels *v = l->voxels;
     int32_t *particles = malloc(24 * (size_t)v->cell_count * sizeof *particles);
     assert_non_null(particles);
-    assert_int_equal(pliant_lattice_particles(v->cell_count, v->cells, particles), l->particle_count);
+    assert_int_equal(pliant_lattice_particles(v->cell_count, v->cells, particles),
+                     l->particle_count);
     assert_memory_equal(particles, l->particles, 3 * (size_t)l->particle_count * sizeof *particles);
     free(particles);
     for (int32_t i = 0; i < v->cell_count; i++)
@@ -61,7 +62,8 @@ static void check_positions(const pliant_mesh *mesh, const pliant_lattice_data *
             for (int d = 0; d < 3; d++) x[d] += phi * (grid->origin[d] + grid->size * p[d]);
         }
         for (int d = 0; d < 3; d++)
-            check_near(x[d], mesh->vertices[3 * (size_t)v + (size_t)d], grid->size * 0x1p-24 + 1e-12);
+            check_near(x[d], mesh->vertices[3 * (size_t)v + (size_t)d],
+                       grid->size * 0x1p-24 + 1e-12);
     }
 }
 
@@ -85,13 +87,15 @@ static void normal_of(const pliant_embedding *e, int32_t v, double n[3])
 {
     const float *u = e->tangents + 6 * (size_t)v, *w = u + 3;
     for (int d = 0; d < 3; d++)
-        n[d] = (double)u[(d + 1) % 3] * (double)w[(d + 2) % 3] - (double)u[(d + 2) % 3] * (double)w[(d + 1) % 3];
+        n[d] = (double)u[(d + 1) % 3] * (double)w[(d + 2) % 3] -
+               (double)u[(d + 2) % 3] * (double)w[(d + 1) % 3];
 }
 
 static void check_batches(const pliant_mesh *mesh, const pliant_lattice_data *l)
 {
     const pliant_batches *b = l->batches;
-    uint8_t *seen = calloc((size_t)mesh->face_count, 1), *used = calloc((size_t)l->particle_count, 1);
+    uint8_t *seen = calloc((size_t)mesh->face_count, 1),
+            *used = calloc((size_t)l->particle_count, 1);
     assert_true(seen && used);
     assert_int_equal(b->face_offset[0], 0);
     assert_int_equal(b->point_offset[0], 0);
@@ -109,7 +113,8 @@ static void check_batches(const pliant_mesh *mesh, const pliant_lattice_data *l)
             assert_int_equal(seen[face]++, 0);
             for (int c = 0; c < 3; c++)
                 for (int k = 0; k < 8; k++) {
-                    const int32_t cell = l->embedding->cell[mesh->faces[3 * (size_t)face + (size_t)c]];
+                    const int32_t cell =
+                        l->embedding->cell[mesh->faces[3 * (size_t)face + (size_t)c]];
                     const int32_t p = l->corners[8 * (size_t)cell + (size_t)k];
                     needed += !used[p];
                     used[p] = 1;
@@ -193,7 +198,8 @@ static void tangents_are_right_handed_about_the_normal(void **state)
 static void tangents_are_orthonormal_about_any_normal(void **state)
 {
     (void)state;
-    const double axes[6][3] = {{0, 0, 1}, {0, 0, -1}, {1e-9, 0, -1}, {1, 0, 0}, {0, -1, -1e-12}, {1, 1, 0}};
+    const double axes[6][3] = {{0, 0, 1}, {0, 0, -1},      {1e-9, 0, -1},
+                               {1, 0, 0}, {0, -1, -1e-12}, {1, 1, 0}};
     for (int i = 0; i < 6; i++) {
         // A pyramid over a triangle across the axis: its tip's normal is the axis.
         pliant_mesh *mesh = check_tetrahedron();
@@ -204,7 +210,8 @@ static void tangents_are_orthonormal_about_any_normal(void **state)
         double along = n[k], u_length = 0;
         for (int d = 0; d < 3; d++) u[d] = (d == k) - along * n[d], u_length += u[d] * u[d];
         for (int d = 0; d < 3; d++) u[d] /= sqrt(u_length);
-        for (int d = 0; d < 3; d++) w[d] = n[(d + 1) % 3] * u[(d + 2) % 3] - n[(d + 2) % 3] * u[(d + 1) % 3];
+        for (int d = 0; d < 3; d++)
+            w[d] = n[(d + 1) % 3] * u[(d + 2) % 3] - n[(d + 2) % 3] * u[(d + 1) % 3];
         const int32_t faces[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
         memcpy(mesh->faces, faces, sizeof faces);
         for (int v = 0; v < 4; v++)
@@ -237,7 +244,8 @@ static void batches_are_few(void **state)
         const pliant_batches *b = l->batches;
         for (int32_t i = 0; i < b->point_offset[b->batch_count]; i++) used += !seen[b->points[i]]++;
         free(seen);
-        printf("sphere of %d faces, %d cells across: %d batches, %.0f particles each, %.2f times the %d in use\n",
+        printf("sphere of %d faces, %d cells across: %d batches, %.0f particles each, %.2f times "
+               "the %d in use\n",
                sphere.mesh->face_count, cells, b->batch_count,
                (double)b->point_offset[b->batch_count] / b->batch_count,
                (double)b->point_offset[b->batch_count] / used, used);
@@ -253,7 +261,8 @@ static void batches_partition_the_faces_of_several_components_in_any_order(void 
     (void)state;
     check_random random = check_random_seed(5);
     for (int i = 0; i < 4; i++) {
-        pliant_mesh *mesh = check_beside(check_beside(check_octahedron(), check_cube()), check_torus(9, 14));
+        pliant_mesh *mesh =
+            check_beside(check_beside(check_octahedron(), check_cube()), check_torus(9, 14));
         if (i > 0) check_shuffle(mesh, &random, NULL);
         for (int32_t cells = 3; cells <= 48; cells *= 4) {
             pliant_lattice_data *l = lattice_of(mesh, cells, 1, PLIANT_VOXELS_SOLID);
@@ -288,7 +297,8 @@ static void half_widths_beyond_the_limit_are_refused(void **state)
     pliant_mesh *cube = check_cube();
     const int32_t wrong[3] = {0, -1, 16};
     for (int i = 0; i < 3; i++) {
-        const pliant_lattice_data_def def = {.name = "cube", .cells = 2, .half_width = wrong[i], .density = 1};
+        const pliant_lattice_data_def def = {
+            .name = "cube", .cells = 2, .half_width = wrong[i], .density = 1};
         pliant_lattice_data *l = NULL;
         pliant_error err = {""};
         assert_int_equal(pliant_lattice_data_create(&def, cube, &l, &err), PLIANT_ERR_ARGUMENT);
@@ -311,7 +321,8 @@ static void the_evaluation_meshes_are_embedded(void **state)
             pliant_lattice_data *l = lattice_of(mesh, cells, 2, PLIANT_VOXELS_SOLID);
             check_all(mesh, l);
             assert_int_equal(l->component_count, 1);
-            printf("%s: %d cells along: %d particles, %d regions, %d irregular; %d faces in %d batches\n",
+            printf("%s: %d cells along: %d particles, %d regions, %d irregular; %d faces in %d "
+                   "batches\n",
                    names[m], cells, l->particle_count, l->regions->region_count,
                    l->regions->region_node_count, mesh->face_count, l->batches->batch_count);
             pliant_lattice_data_destroy(l);

@@ -25,14 +25,16 @@ static double mesh_area(const pliant_mesh *mesh)
 {
     double *areas = malloc((size_t)mesh->vertex_count * sizeof *areas), sum = 0;
     assert_non_null(areas);
-    pliant_mesh_vertex_areas(mesh->vertex_count, mesh->vertices, mesh->face_count, mesh->faces, areas);
+    pliant_mesh_vertex_areas(mesh->vertex_count, mesh->vertices, mesh->face_count, mesh->faces,
+                             areas);
     for (int32_t v = 0; v < mesh->vertex_count; v++) sum += areas[v];
     free(areas);
     return sum;
 }
 
 // What is known of any closed mesh: sums, bounds, and 1 in cells that it does not touch.
-static void check_measure(const pliant_mesh *mesh, const pliant_voxels *v, double *volume, double *area)
+static void check_measure(const pliant_mesh *mesh, const pliant_voxels *v, double *volume,
+                          double *area)
 {
     int32_t longest = 1;
     for (int d = 0; d < 3; d++)
@@ -96,8 +98,9 @@ static void an_octahedrons_cells_hold_what_samples_say(void **state)
             const int32_t steps[3] = {s % SAMPLES, s / SAMPLES % SAMPLES, s / SAMPLES / SAMPLES};
             double sum = 0;
             for (int d = 0; d < 3; d++)
-                sum += fabs(v->grid.origin[d] +
-                            v->grid.size * (v->cells[3 * (size_t)i + (size_t)d] + (steps[d] + 0.5) / SAMPLES));
+                sum +=
+                    fabs(v->grid.origin[d] + v->grid.size * (v->cells[3 * (size_t)i + (size_t)d] +
+                                                             (steps[d] + 0.5) / SAMPLES));
             inside += sum <= radius;
         }
         check_near(volume[i], (double)inside / (SAMPLES * SAMPLES * SAMPLES), 3e-3);
@@ -131,8 +134,11 @@ static void a_lattice_weighs_what_the_solid_weighs(void **state)
     check_surface blob = check_blob(3);
     for (int filling = 0; filling < 2; filling++)
         for (int32_t cells = 1; cells <= 40; cells = 3 * cells + 1) {
-            const pliant_lattice_data_def def = {.name = "blob", .cells = cells, .half_width = 1,
-                                                 .filling = (pliant_voxel_filling)filling, .density = 1250};
+            const pliant_lattice_data_def def = {.name = "blob",
+                                                 .cells = cells,
+                                                 .half_width = 1,
+                                                 .filling = (pliant_voxel_filling)filling,
+                                                 .density = 1250};
             pliant_lattice_data *l = lattice_of(blob.mesh, &def);
             const double expected = 1250 * pliant_mesh_volume(blob.mesh);
             check_near(l->total_mass / expected, 1, 0x1p-24);
@@ -181,7 +187,8 @@ static void the_nearest_point_is_that_of_looking_at_all(void **state)
             double at[3], best = INFINITY;
             int32_t expected = -1;
             for (int d = 0; d < 3; d++)
-                at[d] = i % 2 ? check_random_index(&random, 9) : 12 * check_random_next(&random) - 2;
+                at[d] =
+                    i % 2 ? check_random_index(&random, 9) : 12 * check_random_next(&random) - 2;
             for (int32_t p = 0; p < count; p++) {
                 double square = 0;
                 for (int d = 0; d < 3; d++) square += pow(points[3 * p + d] - at[d], 2);
@@ -209,7 +216,8 @@ static void particles_take_the_nearest_vertexs_density(void **state)
         const double z = mesh->vertices[3 * v + 2];
         densities[v] = fabs(z) < 0.05 ? NAN : z > 0 ? 3000 : 1000;
     }
-    const pliant_lattice_data_def plain = {.name = "ball", .cells = 12, .half_width = 1, .density = 1};
+    const pliant_lattice_data_def plain = {
+        .name = "ball", .cells = 12, .half_width = 1, .density = 1};
     pliant_lattice_data_def dense = plain;
     dense.densities = densities;
     pliant_lattice_data *one = lattice_of(mesh, &plain), *two = lattice_of(mesh, &dense);
@@ -239,7 +247,8 @@ static void masses_that_no_float_holds_are_refused(void **state)
     pliant_mesh *cube = check_cube();
     const double densities[2] = {1e-44, 1e44};
     for (int i = 0; i < 2; i++) {
-        const pliant_lattice_data_def def = {.name = "cube", .cells = 2, .half_width = 1, .density = densities[i]};
+        const pliant_lattice_data_def def = {
+            .name = "cube", .cells = 2, .half_width = 1, .density = densities[i]};
         pliant_lattice_data *l = NULL;
         pliant_error err = {""};
         assert_int_equal(pliant_lattice_data_create(&def, cube, &l, &err), PLIANT_ERR_ARGUMENT);

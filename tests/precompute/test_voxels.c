@@ -32,7 +32,8 @@ static int clip(double (*points)[3], int count, int axis, double at, double side
 }
 
 // Does the triangle meet the box of cells, every side of which is moved outwards by `grown`?
-static int meets(const double corners[3][3], const int32_t first[3], const int32_t last[3], double grown)
+static int meets(const double corners[3][3], const int32_t first[3], const int32_t last[3],
+                 double grown)
 {
     double points[32][3];
     int count = 3;
@@ -63,7 +64,8 @@ static int compare_boxes(const double corners[3][3], double shrunken, double gro
                     if (meets(corners, first, last, -shrunken)) assert_int_equal(found, 1);
                     if (!meets(corners, first, last, grown)) assert_int_equal(found, 0);
                     // Several cells are never denied when one of them is affirmed.
-                    if (found) assert_int_equal(pliant_triangle_box_overlaps(&t, first, last, 2), 1);
+                    if (found)
+                        assert_int_equal(pliant_triangle_box_overlaps(&t, first, last, 2), 1);
                 }
     // Beyond its own box there is nothing.
     for (int d = 0; d < 3; d++) {
@@ -110,7 +112,8 @@ static void triangles_on_cell_planes_edges_and_corners_touch_both_sides(void **s
     check_random random = check_random_seed(2);
     for (int i = 0; i < 3000; i++) {
         double x[3][3];
-        const int32_t parts = i % 2 ? 4 : 1, flat = i % 4 == 3 ? check_random_index(&random, 3) : -1;
+        const int32_t parts = i % 2 ? 4 : 1,
+                      flat = i % 4 == 3 ? check_random_index(&random, 3) : -1;
         for (int c = 0; c < 3; c++)
             for (int d = 0; d < 3; d++) {
                 x[c][d] = 1 + (double)check_random_index(&random, 6 * parts + 1) / parts;
@@ -274,7 +277,8 @@ static int32_t check_tight(const pliant_mesh *mesh, int32_t cells)
 {
     pliant_voxels *solid = voxelise(mesh, cells, PLIANT_VOXELS_SOLID);
     pliant_voxels *shell = voxelise(mesh, cells, PLIANT_VOXELS_SHELL);
-    const int32_t nx = solid->grid.dims[0] + 2, ny = solid->grid.dims[1] + 2, nz = solid->grid.dims[2] + 2;
+    const int32_t nx = solid->grid.dims[0] + 2, ny = solid->grid.dims[1] + 2,
+                  nz = solid->grid.dims[2] + 2;
     const int32_t total = nx * ny * nz, steps[3] = {1, nx, nx * ny};
     uint8_t *wet = calloc((size_t)total, 1);
     int32_t *stack = malloc((size_t)total * sizeof *stack), depth = 1;
@@ -287,7 +291,8 @@ static int32_t check_tight(const pliant_mesh *mesh, int32_t cells)
         for (int k = 0; k < 6; k++) {
             int32_t q[3] = {p[0], p[1], p[2]};
             q[k / 2] += k % 2 ? 1 : -1;
-            if (q[0] < 0 || q[1] < 0 || q[2] < 0 || q[0] >= nx || q[1] >= ny || q[2] >= nz) continue;
+            if (q[0] < 0 || q[1] < 0 || q[2] < 0 || q[0] >= nx || q[1] >= ny || q[2] >= nz)
+                continue;
             const int32_t to = at + (k % 2 ? 1 : -1) * steps[k / 2];
             if (wet[to] || has(shell, q[0] - 1, q[1] - 1, q[2] - 1)) continue;
             wet[to] = 1;
@@ -373,12 +378,14 @@ static pliant_mesh *nested(const double *radii, int count)
         const int32_t n = all ? all->vertex_count : 0, faces = all ? all->face_count : 0;
         pliant_mesh *sum = NULL;
         pliant_error err = {""};
-        check_ok(pliant_mesh_create(n + mesh->vertex_count, faces + mesh->face_count, &sum, &err), &err);
+        check_ok(pliant_mesh_create(n + mesh->vertex_count, faces + mesh->face_count, &sum, &err),
+                 &err);
         if (all) {
             memcpy(sum->vertices, all->vertices, 3 * (size_t)n * sizeof(double));
             memcpy(sum->faces, all->faces, 3 * (size_t)faces * sizeof(int32_t));
         }
-        memcpy(sum->vertices + 3 * (size_t)n, mesh->vertices, 3 * (size_t)mesh->vertex_count * sizeof(double));
+        memcpy(sum->vertices + 3 * (size_t)n, mesh->vertices,
+               3 * (size_t)mesh->vertex_count * sizeof(double));
         for (int32_t k = 0; k < 3 * mesh->face_count; k++)
             sum->faces[3 * (size_t)faces + (size_t)k] = mesh->faces[k] + n;
         pliant_mesh_destroy(all);
@@ -435,7 +442,8 @@ static void thin_plates_are_all_shell(void **state)
         pliant_voxels_destroy(v);
     }
     turn(plate);
-    for (int32_t cells = 5; cells <= 45; cells += 20) assert_int_equal(check_tight(plate, cells), 0);
+    for (int32_t cells = 5; cells <= 45; cells += 20)
+        assert_int_equal(check_tight(plate, cells), 0);
     pliant_mesh_destroy(plate);
 }
 
@@ -487,8 +495,9 @@ static void what_is_too_large_is_refused_with_the_numbers(void **state)
     pliant_error err = {""};
     const int32_t wrong[3] = {0, -4, 1024};
     for (int i = 0; i < 3; i++)
-        assert_int_equal(pliant_voxels_create(cube, "cube", wrong[i], PLIANT_VOXELS_SOLID, 0, &v, &err),
-                         PLIANT_ERR_ARGUMENT);
+        assert_int_equal(
+            pliant_voxels_create(cube, "cube", wrong[i], PLIANT_VOXELS_SOLID, 0, &v, &err),
+            PLIANT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "expected 1 to 1023 cells, found 1024"));
     // The grid, then the cells.
     assert_int_equal(pliant_voxels_create(cube, "cube", 1023, PLIANT_VOXELS_SOLID, 1e9, &v, &err),
@@ -517,8 +526,9 @@ static void the_evaluation_meshes_are_tight(void **state)
             int32_t *particles = malloc(24 * (size_t)v->cell_count * sizeof *particles);
             assert_non_null(particles);
             const double volume = v->cell_count * pow(v->grid.size, 3);
-            printf("%s: %d cells along: %d cells, %d particles, %.2f of the mesh's volume\n", names[m],
-                   cells, v->cell_count, pliant_lattice_particles(v->cell_count, v->cells, particles),
+            printf("%s: %d cells along: %d cells, %d particles, %.2f of the mesh's volume\n",
+                   names[m], cells, v->cell_count,
+                   pliant_lattice_particles(v->cell_count, v->cells, particles),
                    volume / pliant_mesh_volume(mesh));
             check_at_least(volume, pliant_mesh_volume(mesh));
             free(particles);
