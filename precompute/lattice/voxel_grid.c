@@ -3,9 +3,6 @@
 
 #include <math.h>
 
-// Part of the longest side that the grid stands out at each of its ends: above the rounding of
-// positions (a mesh of size 1 at 10^9 from the origin still has 2e-7), far below what shows.
-static const double margin = 1e-6;
 // Parts of a cell that a side may exceed a whole number of cells by rounding.
 static const double rounding = 1e-9;
 
@@ -21,9 +18,9 @@ pliant_voxel_grid pliant_voxel_grid_place(const pliant_mesh *mesh, int32_t cell_
         }
         longest = fmax(longest, high[d] - low[d]);
     }
-    pliant_voxel_grid grid = {.size = longest * (1 + 2 * margin) / cell_count};
+    pliant_voxel_grid grid = {.size = longest / cell_count};
     for (int d = 0; d < 3; d++) {
-        const double cells = ceil((high[d] - low[d]) * (1 + 2 * margin) / grid.size - rounding);
+        const double cells = ceil((high[d] - low[d]) / grid.size - rounding);
         grid.dims[d] = cells < 1 ? 1 : cells > cell_count ? cell_count : (int32_t)cells;
         grid.origin[d] = (low[d] + high[d]) / 2 - grid.dims[d] * grid.size / 2;
     }

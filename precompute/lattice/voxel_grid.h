@@ -15,9 +15,9 @@ typedef struct pliant_voxel_grid {
 } pliant_voxel_grid;
 
 // A grid centred on the mesh's bounding box: `cell_count` (1 .. PLIANT_VOXEL_CELL_LIMIT) cells
-// along its longest side, as many as it takes along the others, at least one. The cells are larger
-// by two millionths than the longest side asks for, so that the faces of the bounding box lie
-// inside the outermost cells instead of between them and others.
+// along its longest side, as many as it takes along the others, at least one. There is no margin:
+// what touches the grid's own boundary, or stands out of it by rounding, is in the outermost cells,
+// since there are no others.
 pliant_voxel_grid pliant_voxel_grid_place(const pliant_mesh *mesh, int32_t cell_count);
 
 // Grid coordinates of a position: (x - origin) / size. Everything that goes from positions to cells

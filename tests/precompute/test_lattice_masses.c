@@ -64,7 +64,9 @@ static void the_cells_volumes_and_areas_add_up(void **state)
     (void)state;
     pliant_mesh *meshes[] = {check_octahedron(), check_torus(12, 20), check_block(2), check_cube()};
     for (size_t m = 0; m < sizeof meshes / sizeof *meshes; m++) {
-        for (int32_t cells = 1; cells <= 50; cells = 2 * cells + 3) {
+        // 10 and 20: faces of the block (5 x 3 x 1) lie in planes between cells.
+        for (int32_t cells = 1; cells <= 50;
+             cells = cells == 5 ? 10 : 2 * cells + 3 * (cells < 5)) {
             pliant_voxels *v = voxelise(meshes[m], cells, PLIANT_VOXELS_SOLID);
             double *volume = malloc((size_t)v->cell_count * sizeof *volume);
             double *area = malloc((size_t)v->cell_count * sizeof *area);
@@ -152,8 +154,8 @@ static void a_lattice_weighs_what_the_solid_weighs(void **state)
     check_surface_destroy(&blob);
 }
 
-// A box that fills its cells, but for the grid's margin of millionths: inner particles weigh a
-// cell's mass, those of faces a half, of edges a quarter, corners an eighth.
+// A box that fills its cells: inner particles weigh a cell's mass, those of faces a half, of edges
+// a quarter, corners an eighth.
 static void particles_of_a_box_weigh_what_is_around_them(void **state)
 {
     (void)state;
@@ -165,7 +167,7 @@ static void particles_of_a_box_weigh_what_is_around_them(void **state)
         double expected = 8;
         for (int d = 0; d < 3; d++)
             if (l->particles[3 * i + d] % 4 == 0) expected /= 2;
-        check_near((double)l->mass[i], expected, 1e-5 * expected);
+        check_near((double)l->mass[i], expected, 1e-6 * expected);
     }
     pliant_lattice_data_destroy(l);
     pliant_mesh_destroy(box);

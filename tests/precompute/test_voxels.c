@@ -141,6 +141,37 @@ static void triangles_on_cell_planes_edges_and_corners_touch_both_sides(void **s
     }
 }
 
+// An edge that runs through a corner of cells, but for rounding, touches all eight of them; and so
+// does a sliver along it, however thin.
+static void what_rounding_cannot_tell_from_touching_touches(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(6);
+    for (int i = 0; i < 3000; i++) {
+        double x[3][3], forth = 0.2 + check_random_next(&random),
+                        back = 0.2 + check_random_next(&random);
+        int32_t corner[3];
+        const double width = pow(10, -15 * check_random_next(&random));
+        for (int d = 0; d < 3; d++) {
+            const double along = check_random_next(&random) - 0.5;
+            corner[d] = 2 + check_random_index(&random, 4);
+            x[0][d] = corner[d] + forth * along;
+            x[1][d] = corner[d] - back * along;
+            x[2][d] = corner[d] + 0.3 * along + width * (check_random_next(&random) - 0.5);
+        }
+        pliant_triangle_box t;
+        pliant_triangle_box_prepare((const double(*)[3])x, grid_dims, &t);
+        for (int k = 0; k < 8; k++) {
+            int32_t cell[3];
+            for (int d = 0; d < 3; d++) {
+                cell[d] = corner[d] - (k >> d & 1);
+                assert_in_range(cell[d], t.first[d], t.last[d]);
+            }
+            assert_int_equal(pliant_triangle_box_overlaps(&t, cell, cell, 1), 1);
+        }
+    }
+}
+
 static void slivers_down_to_a_line_touch_what_the_line_touches(void **state)
 {
     (void)state;
@@ -335,6 +366,67 @@ static void no_flood_by_faces_gets_through_a_shell(void **state)
     check_surface_destroy(&blob);
 }
 
+// A box of 4 x 3 x 3 with a hole of 3 x 1 x 1 from the side x = 0, drawn out along x.
+static pliant_mesh *drawn_cup(double length)
+{
+    // Corners of a box, bit 0: x, 1: y, 2: z; its sides -x, +x, -y, +y, -z, +z seen from outside.
+    static const int32_t sides[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                        {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+    int32_t quads[14][4], count = 0;
+    for (int s = 1; s < 6; s++, count += 2)
+        for (int k = 0; k < 4; k++) {
+            quads[count][k] = sides[s][k];
+            quads[count + 1][k] = 8 + sides[s][3 - k];
+        }
+    for (int k = 0; k < 4; k++, count++) {
+        const int32_t a = sides[0][k], b = sides[0][(k + 1) % 4];
+        memcpy(quads[count], (int32_t[4]){a, b, 8 + b, 8 + a}, sizeof quads[0]);
+    }
+    pliant_mesh *mesh = NULL;
+    pliant_error err = {""};
+    check_ok(pliant_mesh_create(16, 28, &mesh, &err), &err);
+    for (int v = 0; v < 16; v++) {
+        double *x = mesh->vertices + 3 * v;
+        x[0] = v & 1 ? (v < 8 ? 4 : 3) * length / 4 : 0;
+        for (int d = 1; d < 3; d++) x[d] = v < 8 ? 3 * (v >> d & 1) : 1 + (v >> d & 1);
+    }
+    for (int q = 0; q < 14; q++)
+        for (int k = 0; k < 2; k++)
+            memcpy(mesh->faces + 6 * q + 3 * k,
+                   (int32_t[3]){quads[q][0], quads[q][1 + k], quads[q][2 + k]},
+                   3 * sizeof(int32_t));
+    return mesh;
+}
+
+// Hundreds of cells deep, along every axis and from both ends: the flood finds the bottom.
+static void a_deep_hole_stays_open_to_its_bottom(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        pliant_mesh *cup = drawn_cup(100);
+        check_near(pliant_mesh_volume(cup), 900 - 75, 1e-9);
+        for (int32_t v = 0; v < cup->vertex_count; v++) {
+            // Turned so that the long axis is x, y or z, by a rotation; k odd: about another one by
+            // pi.
+            double *x = cup->vertices + 3 * v, y[3];
+            for (int d = 0; d < 3; d++) y[(d + k / 2) % 3] = x[d];
+            for (int d = 0; d < 3; d++) x[d] = k % 2 && d != (k / 2 + 1) % 3 ? -y[d] : y[d];
+        }
+        // A cell of 0.25: the planes of the cup lie between cells, which touch on both sides.
+        assert_true(check_tight(cup, 400) > 0);
+        pliant_voxels *v = voxelise(cup, 400, PLIANT_VOXELS_SOLID);
+        double at[3];
+        for (double along = 0.1; along < 100; along += 7) {
+            const double from[3] = {along, 1.55, 1.55};
+            for (int d = 0; d < 3; d++) at[(d + k / 2) % 3] = from[d];
+            for (int d = 0; d < 3; d++) at[d] = k % 2 && d != (k / 2 + 1) % 3 ? -at[d] : at[d];
+            assert_int_equal(holds(v, at[0], at[1], at[2]), along > 74);
+        }
+        pliant_voxels_destroy(v);
+        pliant_mesh_destroy(cup);
+    }
+}
+
 static void the_hole_of_a_torus_stays_open(void **state)
 {
     (void)state;
@@ -447,7 +539,7 @@ static void thin_plates_are_all_shell(void **state)
     pliant_mesh_destroy(plate);
 }
 
-// A box of whole cells has them all and no more: its faces lie inside the outermost.
+// A box of whole cells has them all and no more.
 static void a_box_of_whole_cells_is_its_cells(void **state)
 {
     (void)state;
@@ -459,7 +551,7 @@ static void a_box_of_whole_cells_is_its_cells(void **state)
         assert_int_equal(v->grid.dims[1], 4 * scale);
         assert_int_equal(v->grid.dims[2], scale);
         assert_int_equal(v->cell_count, 28 * scale * scale * scale);
-        check_near(v->grid.size, 0.2 / scale, 1e-6);
+        check_near(v->grid.size, 0.2 / scale, 1e-15);
         pliant_voxels_destroy(v);
     }
     pliant_mesh_destroy(box);
@@ -543,10 +635,12 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_triangles_overlap_the_boxes_that_they_reach_into),
         cmocka_unit_test(triangles_on_cell_planes_edges_and_corners_touch_both_sides),
+        cmocka_unit_test(what_rounding_cannot_tell_from_touching_touches),
         cmocka_unit_test(slivers_down_to_a_line_touch_what_the_line_touches),
         cmocka_unit_test(a_shell_is_every_cell_that_some_triangle_meets),
         cmocka_unit_test(a_balls_cells_have_the_volume_of_the_ball_and_a_cube),
         cmocka_unit_test(no_flood_by_faces_gets_through_a_shell),
+        cmocka_unit_test(a_deep_hole_stays_open_to_its_bottom),
         cmocka_unit_test(the_hole_of_a_torus_stays_open),
         cmocka_unit_test(cavities_stay_open_and_bodies_inside_them_are_filled),
         cmocka_unit_test(components_are_voxelised_each),
