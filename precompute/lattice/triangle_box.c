@@ -1,7 +1,6 @@
 // triangle_box.c: does a triangle touch a box of whole cells?
 #include "lattice/triangle_box.h"
 
-#include <float.h>
 #include <math.h>
 
 static double size_of(const double v[3])
@@ -28,8 +27,6 @@ void pliant_triangle_box_prepare(const double corners[3][3], const int32_t dims[
     }
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++) edge[c][d] = p[(c + 1) % 3][d] - p[c][d];
-    double reach = 0;  // of the triangle's own box
-    for (int d = 0; d < 3; d++) reach += t->last[d] - t->first[d] + 1;
 
     for (int c = 0; c < 3; c++)
         for (int d = 0; d < 3; d++) {
@@ -39,6 +36,8 @@ void pliant_triangle_box_prepare(const double corners[3][3], const int32_t dims[
             a[(d + 1) % 3] = -edge[c][(d + 2) % 3];
             a[(d + 2) % 3] = edge[c][(d + 1) % 3];
         }
+    // A sliver's normal may be wrong, and the axes of a line or a point are zero: what touches is
+    // separated along no axis whatever, right or wrong.
     double *n = t->axis[9];
     for (int d = 0; d < 3; d++)
         n[d] = edge[0][(d + 1) % 3] * edge[1][(d + 2) % 3] -
@@ -54,8 +53,6 @@ void pliant_triangle_box_prepare(const double corners[3][3], const int32_t dims[
         }
         t->slack[i] = PLIANT_TRIANGLE_SLACK * size_of(a);
     }
-    // A sliver's normal is a difference of products that are larger than it is.
-    t->slack[9] += 16 * DBL_EPSILON * size_of(edge[0]) * size_of(edge[1]) * reach;
 }
 
 int pliant_triangle_box_overlaps(const pliant_triangle_box *t, const int32_t first[3],
