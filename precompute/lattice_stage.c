@@ -63,15 +63,12 @@ pliant_status pliant_lattice_stage_build(const pliant_options *options,
                                              .filling = options->filling,
                                              .density = options->material.density,
                                              .densities = densities,
-                                             .available = pliant_node_available()};
+                                             .available = pliant_node_available(),
+                                             .progress = progress};
         status = pliant_lattice_data_create(&def, multires->mesh, lattice, err);
     }
     free(densities);
     if (status < 0) return status;
     *summary = summarise(*lattice);
-    pliant_progress_note(progress,
-                         "lattice of %d x %d x %d cells: %d of them, %d particles, %d regions",
-                         summary->dims[0], summary->dims[1], summary->dims[2], summary->cells,
-                         summary->particles, summary->regions);
     return PLIANT_OK;
 }

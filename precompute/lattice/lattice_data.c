@@ -122,6 +122,14 @@ static pliant_status find_batches(pliant_lattice_data *l, const pliant_mesh *mes
     return pliant_batches_create(&input, &l->batches, err);
 }
 
+static void note(const pliant_lattice_data *l, pliant_progress *progress)
+{
+    const int32_t *dims = l->voxels->grid.dims;
+    if (progress)
+        pliant_progress_note(progress, "lattice of %d x %d x %d cells: %d of them, %d particles",
+                             dims[0], dims[1], dims[2], l->voxels->cell_count, l->particle_count);
+}
+
 pliant_status pliant_lattice_data_create(const pliant_lattice_data_def *def,
                                          const pliant_mesh *mesh, pliant_lattice_data **data,
                                          pliant_error *err)
@@ -131,6 +139,7 @@ pliant_status pliant_lattice_data_create(const pliant_lattice_data_def *def,
     pliant_status status = pliant_voxels_create(mesh, def->name, def->cells, def->filling,
                                                 def->available, &l->voxels, err);
     if (status == PLIANT_OK) status = number_particles(l, def->name, err);
+    if (status == PLIANT_OK) note(l, def->progress);
     if (status == PLIANT_OK) status = count_components(l, err);
     if (status == PLIANT_OK) status = weigh(l, def, mesh, err);
     if (status == PLIANT_OK) status = find_regions(l, def->half_width, err);

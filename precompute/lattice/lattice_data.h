@@ -4,6 +4,7 @@
 #include "lattice/batches.h"
 #include "lattice/embedding.h"
 #include "lattice/voxels.h"
+#include "progress.h"
 
 #include "pliant/regions.h"
 
@@ -12,9 +13,10 @@ typedef struct pliant_lattice_data_def {
     int32_t cells;       // along the longest side
     int32_t half_width;  // w, 1 .. PLIANT_LATTICE_WIDTH_LIMIT
     pliant_voxel_filling filling;
-    double density;           // kg/m^3
-    const double *densities;  // shape [vertex_count], NAN where not known; NULL: `density`
-    double available;         // bytes that may be taken; 0: any number
+    double density;             // kg/m^3
+    const double *densities;    // shape [vertex_count], NAN where not known; NULL: `density`
+    double available;           // bytes that may be taken; 0: any number
+    pliant_progress *progress;  // for a note before the long part; NULL: say nothing
 } pliant_lattice_data_def;
 
 typedef struct pliant_lattice_data {
