@@ -647,3 +647,162 @@ typedef struct pliant_lattice_batch {
 } pliant_lattice_batch;
 PLIANT_CALL pliant_status pliant_lattice_find_batch(const pliant_lattice *lattice, int32_t batch,
                                                     pliant_lattice_batch *found);
+// ---- Worlds of lattice bodies ----
+
+// What bodies live in: gravity, obstacles, holds that drag particles about (hands, bones), and each
+// other. A world steps its bodies in place of pliant_body_step. Bodies are borrowed from add until
+// remove or destroy and may be read and written between steps (impulses, saved positions put back);
+// they need not have the same lattice. A world has one user at a time, and no two worlds the same
+// body. The same calls give the same bits, whatever the number of threads.
+//
+// Everything is allocated by create: what has no room later is refused with PLIANT_ERR_CAPACITY.
+// Refusals have no effect. Obstacles and holds are numbered by the caller, 0 .. capacity - 1.
+typedef struct pliant_world pliant_world;
+
+// Who collides with whom, bits to be added. Balls are particles with a radius of half their cells.
+enum {
+    PLIANT_COLLISION_NONE = 0,
+    PLIANT_COLLISION_BODIES = 1,    // balls of different bodies; a cell's width between surfaces
+    PLIANT_COLLISION_SELF = 2,      // balls of one body that are more than two cells apart at rest
+    PLIANT_COLLISION_SURFACES = 4,  // particles with the embedded surfaces of other bodies
+};
+
+typedef struct pliant_world_def {
+    int32_t body_capacity;      // Default 256
+    int32_t particle_capacity;  // particles of all bodies together. Default 65536
+    int32_t obstacle_capacity;  // Default 64
+    int32_t hold_capacity;      // Default 64
+    int32_t held_capacity;      // particles in all holds together. Default 4096
+    int32_t thread_count;       // 1 .. 64, the caller's among them. Default 1
+    pliant_vec3 gravity;        // m/s^2. Default 0, 0, -9.81
+    int32_t collision;          // PLIANT_COLLISION_ bits. Default PLIANT_COLLISION_BODIES
+    // Of bodies with each other. Coulomb's coefficient, 0 .. 10. Balls have no spin to take up the
+    // torque of friction, so that above 0 their angular momentum is not kept (linear momentum is).
+    // Default 0: what holds a heap together is that balls are uneven.
+    float friction;
+} pliant_world_def;
+PLIANT_API pliant_world_def pliant_world_default(void);
+PLIANT_CALL pliant_status pliant_world_create(const pliant_world_def *def, pliant_world **world,
+                                              pliant_error *err);
+PLIANT_API void pliant_world_destroy(pliant_world *world);  // before its bodies; NULL is fine
+
+// PLIANT_ERR_ARGUMENT: a body that is in the world already.
+PLIANT_CALL pliant_status pliant_world_add(pliant_world *world, pliant_body *body,
+                                           pliant_error *err);
+PLIANT_CALL pliant_status pliant_world_remove(pliant_world *world,
+                                              pliant_body *body);  // its holds let go
+
+PLIANT_CALL pliant_status pliant_world_set_gravity(pliant_world *world, pliant_vec3 acceleration);
+PLIANT_CALL pliant_status pliant_world_set_collision(pliant_world *world, int32_t collision,
+                                                     float friction);
+
+// Advance by `dt` seconds: forces and shape matching, contacts, holds, motion, fracture. Stable for
+// any dt above 0 and any state; what is not finite is PLIANT_ERR_ARGUMENT.
+PLIANT_CALL pliant_status pliant_world_step(pliant_world *world, float dt);
+
+// ---- Obstacles ----
+
+typedef enum pliant_obstacle_kind {
+    PLIANT_OBSTACLE_NONE = 0,
+    PLIANT_OBSTACLE_PLANE = 1,  // solid on the side that its normal points away from
+    PLIANT_OBSTACLE_SPHERE = 2,
+    PLIANT_OBSTACLE_BOX = 3,
+    PLIANT_OBSTACLE_CAPSULE = 4,  // a ball swept along a segment, tapered when the radii differ
+} pliant_obstacle_kind;
+
+// A solid that particles stay outside of. It is not moved by them.
+typedef struct pliant_obstacle {
+    pliant_obstacle_kind kind;
+    pliant_vec3 a;      // m; plane: a point on it; sphere, box: centre; capsule: one end
+    pliant_vec3 b;      // plane: normal, of any length but 0; capsule: other end, m; box: half its
+                        // sides, m. Plane and capsule: where they are before `rotation`
+    float radius;       // m, above 0; sphere; capsule at a
+    float radius_b;     // m, 0 or more; capsule at b
+    float rotation[4];  // x, y, z, w; about a
+    pliant_vec3 velocity;  // m/s, of a: it goes on moving with this,
+    pliant_vec3 spin;      // rad/s, and turning about a with this
+    float friction;        // Coulomb's coefficient, 0 .. 10
+    float restitution;     // 0 .. 1, speed after over speed before, of each particle
+} pliant_obstacle;
+// At the origin and at rest, of unit size (radii, half sides 1), normal and axis along z; friction
+// 0.5, restitution 0.
+PLIANT_API pliant_obstacle pliant_obstacle_default(pliant_obstacle_kind kind);
+
+// Put obstacle `index` somewhere at once; PLIANT_OBSTACLE_NONE takes it away. Copied. Particles
+// that are inside one then come out at a bounded speed.
+PLIANT_CALL pliant_status pliant_world_set_obstacle(pliant_world *world, int32_t index,
+                                                    const pliant_obstacle *obstacle);
+// Move it so that it is there, its point a and its rotation (shape [4], unit; NULL: unchanged), at
+// the end of the next step, pushing what is in its way; then it is at rest.
+// PLIANT_ERR_MISSING: no such obstacle.
+PLIANT_CALL pliant_status pliant_world_move_obstacle(pliant_world *world, int32_t index,
+                                                     pliant_vec3 a, const float *rotation);
+// As it is now; kind PLIANT_OBSTACLE_NONE: there is none.
+PLIANT_API pliant_obstacle pliant_world_obstacle(const pliant_world *world, int32_t index);
+
+// ---- Holds ----
+
+// A hold is a rigid frame with particles bound to it: a hand that has grabbed some, a bone of a
+// skeleton. Its particles follow it exactly: at the end of a step they are where the frame has
+// them, with its velocity; nothing else moves them. A particle has one hold at most.
+
+// Place a hold with nothing bound to it; one that is there lets go first. `rotation` has shape [4],
+// x, y, z, w; NULL: none.
+PLIANT_CALL pliant_status pliant_world_set_hold(pliant_world *world, int32_t hold,
+                                                pliant_vec3 position, const float *rotation);
+// Bind particles where they are now, in the frame as it is now: listed ones (NULL: 0 .. count - 1),
+// or those within `radius` of the segment from `a` to `b`, of which `bound` (nullable) tells how
+// many. Those that another hold has are taken over. PLIANT_ERR_MISSING: no such hold, or a body
+// that is not in the world.
+PLIANT_CALL pliant_status pliant_world_bind(pliant_world *world, int32_t hold, pliant_body *body,
+                                            const int32_t *particles, int32_t count);
+PLIANT_CALL pliant_status pliant_world_bind_near(pliant_world *world, int32_t hold,
+                                                 pliant_body *body, pliant_vec3 a, pliant_vec3 b,
+                                                 float radius, int32_t *bound);
+// All at once: a hold at `position` with the particles within `radius` of it, or, where there are
+// none, with the nearest one alone, and then its position is that particle's.
+PLIANT_CALL pliant_status pliant_world_grab(pliant_world *world, int32_t hold, pliant_body *body,
+                                            pliant_vec3 position, float radius, int32_t *bound);
+// Where the frame is at the end of the next step, and stays. Rotation NULL: unchanged.
+PLIANT_CALL pliant_status pliant_world_move_hold(pliant_world *world, int32_t hold,
+                                                 pliant_vec3 position, const float *rotation);
+// Let go; its particles keep their velocity. A number without a hold is fine.
+PLIANT_CALL pliant_status pliant_world_let(pliant_world *world, int32_t hold);
+
+// Where a hold is, and how many particles it has; -1: there is none.
+typedef struct pliant_hold_info {
+    pliant_vec3 position;
+    float rotation[4];
+    int32_t particle_count;
+} pliant_hold_info;
+PLIANT_API pliant_hold_info pliant_world_hold(const pliant_world *world, int32_t hold);
+
+// ---- What a world tells ----
+
+// Of all bodies now.
+typedef struct pliant_world_sum {
+    double mass;                 // kg
+    double centre[3];            // m
+    double momentum[3];          // kg m/s
+    double angular_momentum[3];  // kg m^2/s, about the origin
+    double kinetic_energy;       // J
+    double potential_energy;     // J, of gravity, 0 at the origin
+} pliant_world_sum;
+PLIANT_API pliant_world_sum pliant_world_add_up(const pliant_world *world);
+
+// What the last step did; times are monotonic nanoseconds of the calling thread.
+typedef struct pliant_world_report {
+    int32_t body_count, particle_count, held_count;
+    int32_t obstacle_contact_count;  // pairs of a particle and an obstacle that holds it off
+    int32_t body_contact_count;     // pairs of balls of different bodies that touch or are about to
+    int32_t self_contact_count;     // of one body
+    int32_t surface_contact_count;  // particles inside another body's surface
+    float narrowing;                // 1; below: so many contacts that balls were taken smaller
+    int64_t match_ns;               // forces, shape matching, damping
+    int64_t obstacle_ns;            // contacts with obstacles
+    int64_t search_ns;              // finding what touches
+    int64_t contact_ns;             // contacts among bodies
+    int64_t move_ns;                // motion, projection, holds, fracture
+    int64_t total_ns;
+} pliant_world_report;
+PLIANT_API pliant_world_report pliant_world_last(const pliant_world *world);
