@@ -659,12 +659,15 @@ PLIANT_CALL pliant_status pliant_lattice_find_batch(const pliant_lattice *lattic
 // Refusals have no effect. Obstacles and holds are numbered by the caller, 0 .. capacity - 1.
 typedef struct pliant_world pliant_world;
 
-// Who collides with whom, bits to be added. Balls are particles with a radius of half their cells.
+// Who collides with whom, bits to be added. Balls are a body's outer particles with a radius of
+// half a cell. They do not let anything in that moves by less than that in a step, but keep
+// surfaces one or two cells apart. What is inside another's surface, because it was fast or because
+// there are no balls, is pushed out at a bounded speed, on the undeformed shape's way out.
 enum {
     PLIANT_COLLISION_NONE = 0,
-    PLIANT_COLLISION_BODIES = 1,    // balls of different bodies; a cell's width between surfaces
+    PLIANT_COLLISION_BODIES = 1,    // balls of different bodies
     PLIANT_COLLISION_SELF = 2,      // balls of one body that are more than two cells apart at rest
-    PLIANT_COLLISION_SURFACES = 4,  // particles with the embedded surfaces of other bodies
+    PLIANT_COLLISION_SURFACES = 4,  // particles inside the embedded surfaces of other bodies
 };
 
 typedef struct pliant_world_def {
@@ -675,10 +678,10 @@ typedef struct pliant_world_def {
     int32_t held_capacity;      // particles in all holds together. Default 4096
     int32_t thread_count;       // 1 .. 64, the caller's among them. Default 1
     pliant_vec3 gravity;        // m/s^2. Default 0, 0, -9.81
-    int32_t collision;          // PLIANT_COLLISION_ bits. Default PLIANT_COLLISION_BODIES
-    // Of bodies with each other. Coulomb's coefficient, 0 .. 10. Balls have no spin to take up the
-    // torque of friction, so that above 0 their angular momentum is not kept (linear momentum is).
-    // Default 0: what holds a heap together is that balls are uneven.
+    int32_t collision;          // bits. Default PLIANT_COLLISION_BODIES | PLIANT_COLLISION_SURFACES
+    // Of bodies with each other: Coulomb's coefficient, 0 .. 10. Default 0.3. Between balls, which
+    // have no spin to take up its torque, friction does not keep angular momentum; all else does,
+    // and linear momentum is always kept.
     float friction;
 } pliant_world_def;
 PLIANT_API pliant_world_def pliant_world_default(void);
@@ -696,8 +699,9 @@ PLIANT_CALL pliant_status pliant_world_set_gravity(pliant_world *world, pliant_v
 PLIANT_CALL pliant_status pliant_world_set_collision(pliant_world *world, int32_t collision,
                                                      float friction);
 
-// Advance by `dt` seconds: forces and shape matching, contacts, holds, motion, fracture. Stable for
-// any dt above 0 and any state; what is not finite is PLIANT_ERR_ARGUMENT.
+// Advance by `dt` seconds: forces and shape matching, contacts, holds, motion, fracture. Stable in
+// any state. PLIANT_ERR_ARGUMENT: not within 1e-9 .. 1000 s. Places and velocities are accepted up
+// to 1e9 m and m/s.
 PLIANT_CALL pliant_status pliant_world_step(pliant_world *world, float dt);
 
 // ---- Obstacles ----

@@ -1,0 +1,261 @@
+// dents.c: particles that are inside another body, and the way out.
+//
+// This follows: S. Fisher and M. C. Lin, Fast Penetration Depth Estimation for Elastic Bodies Using
+// Deformed Distance Fields, IROS 2001; and for finding points in cells M. Teschner et al., VMV
+// 2003.
+#include "lattice/dents.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DENT_TASK     64  // cells of a task
+#define NEWTON_LIMIT  8
+#define NEWTON_STEP   1.5f  // cells: farther at once is no cell that can be inverted
+#define NEWTON_ENOUGH 1e-5f
+#define CELL_SLACK    1e-3f  // beyond a cell's faces, so that nothing falls between two
+// Cells stretched to more than this, in cells, are torn or thrown about and hold nobody.
+#define CELL_STRETCH 4.0f
+// Depths that change by less than this part of the way are those of a shape's middle: no way out.
+#define NO_DIRECTION 0.1f
+// As balls that overlap (touches.c).
+#define PART_SHARE 0.1f
+#define PART_SPEED 10.0f  // cells a second
+
+// The corners of a cell of the crowd, and their depths.
+typedef struct hull {
+    const pliant_member *member;
+    const int32_t *particles;  // of the member
+    float x[8][3], depth[8];
+} hull;
+
+static int32_t member_of_cell(const pliant_crowd *crowd, int32_t cell)
+{
+    int32_t least = 0, most = crowd->member_count;
+    while (most - least > 1) {
+        const int32_t middle = (least + most) / 2;
+        if (crowd->members[middle].cell_first <= cell) least = middle;
+        else most = middle;
+    }
+    return least;
+}
+
+static void load_hull(const pliant_crowd *crowd, const pliant_member *member, int32_t cell, hull *h)
+{
+    h->member = member;
+    h->particles = crowd->corners + 8 * (size_t)cell;
+    for (int k = 0; k < 8; k++) {
+        const int32_t p = h->particles[k], slot = member->body->lattice->slot[p];
+        for (int c = 0; c < 3; c++) h->x[k][c] = member->body->x[slot + PLIANT_LANES * c];
+        h->depth[k] = crowd->depth[member->first + p];
+    }
+}
+
+static float determinant(const float m[3][3])
+{
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+// Solve m t = r; 0: it has no inverse to speak of, or turns the cell inside out.
+static int32_t solve(const float m[3][3], const float r[3], float least, float t[3])
+{
+    const float whole = determinant(m);
+    if (!(whole > least)) return 0;
+    for (int c = 0; c < 3; c++) {
+        float part[3][3];
+        memcpy(part, m, sizeof part);
+        for (int k = 0; k < 3; k++) part[k][c] = r[k];
+        t[c] = determinant((const float(*)[3])part) / whole;
+    }
+    return 1;
+}
+
+// Weights of the corners at t, and their derivatives.
+static void find_weights(const float t[3], float weights[8], float slopes[8][3])
+{
+    for (int k = 0; k < 8; k++) {
+        const float a = k & 1 ? t[0] : 1 - t[0], b = k & 2 ? t[1] : 1 - t[1],
+                    d = k & 4 ? t[2] : 1 - t[2];
+        weights[k] = a * b * d;
+        slopes[k][0] = (k & 1 ? 1 : -1) * b * d;
+        slopes[k][1] = (k & 2 ? 1 : -1) * a * d;
+        slopes[k][2] = (k & 4 ? 1 : -1) * a * b;
+    }
+}
+
+// J[r][c] = dx_r / dt_c, and what is left of the way to the point.
+static void map(const hull *h, const float *point, const float weights[8], const float slopes[8][3],
+                float J[3][3], float left[3])
+{
+    for (int r = 0; r < 3; r++) {
+        left[r] = point[r];
+        for (int c = 0; c < 3; c++) J[r][c] = 0;
+    }
+    for (int k = 0; k < 8; k++)
+        for (int r = 0; r < 3; r++) {
+            left[r] -= weights[k] * h->x[k][r];
+            for (int c = 0; c < 3; c++) J[r][c] += slopes[k][c] * h->x[k][r];
+        }
+}
+
+// The place in the cell that the point is at: its corners' weights, the map's and the depth's
+// slopes there. 1: the point is in the cell.
+static int32_t invert(const hull *h, const float *point, float weights[8], float J[3][3],
+                      float slope[3])
+{
+    float t[3] = {0.5f, 0.5f, 0.5f}, slopes[8][3], left[3], step[3];
+    const float size = h->member->body->lattice->cell_size, least = 1e-3f * size * size * size;
+    for (int i = 0; i < NEWTON_LIMIT; i++) {
+        find_weights(t, weights, slopes);
+        map(h, point, weights, (const float(*)[3])slopes, J, left);
+        if (!solve((const float(*)[3])J, left, least, step)) return 0;
+        float farthest = 0;
+        for (int c = 0; c < 3; c++) {
+            t[c] += step[c];
+            farthest = fmaxf(farthest, fabsf(step[c]));
+        }
+        if (!(farthest <= NEWTON_STEP)) return 0;
+        if (farthest > NEWTON_ENOUGH) continue;
+        for (int c = 0; c < 3; c++)
+            if (!(t[c] >= -CELL_SLACK && t[c] <= 1 + CELL_SLACK)) return 0;
+        find_weights(t, weights, slopes);
+        for (int c = 0; c < 3; c++) {
+            slope[c] = 0;
+            for (int k = 0; k < 8; k++) slope[c] += slopes[k][c] * h->depth[k];
+        }
+        return 1;
+    }
+    return 0;
+}
+
+static float depth_at(const hull *h, const float weights[8])
+{
+    float depth = 0;
+    for (int k = 0; k < 8; k++) depth += weights[k] * h->depth[k];
+    return depth;
+}
+
+// ---- Choosing ----
+
+typedef struct box {
+    float low[3], high[3];
+} box;
+
+static box box_of(const hull *h)
+{
+    box b;
+    for (int c = 0; c < 3; c++) {
+        b.low[c] = b.high[c] = h->x[0][c];
+        for (int k = 1; k < 8; k++) {
+            b.low[c] = fminf(b.low[c], h->x[k][c]);
+            b.high[c] = fmaxf(b.high[c], h->x[k][c]);
+        }
+    }
+    return b;
+}
+
+// 1: worth a look: below the surface somewhere, in one piece, near another body.
+static int32_t is_of_interest(const pliant_touches *touches, int32_t member, const hull *h,
+                              const box *b)
+{
+    int32_t is_below = 0;
+    for (int k = 0; k < 8; k++) is_below |= h->depth[k] < 0;
+    if (!is_below) return 0;
+    const float size = h->member->body->lattice->cell_size;
+    float middle[3], reach = 0;
+    for (int c = 0; c < 3; c++) {
+        const float side = b->high[c] - b->low[c];
+        if (!(side <= CELL_STRETCH * size)) return 0;
+        middle[c] = 0.5f * (b->low[c] + b->high[c]);
+        reach = fmaxf(reach, side);
+    }
+    return pliant_overlaps_has(&touches->overlaps, touches->crowd, member, middle, 0.25f * reach);
+}
+
+static void offer(pliant_touches *touches, int32_t member, int32_t cell, const hull *h,
+                  const box *b, int32_t k)
+{
+    const float *point = touches->hash.sorted + 4 * (size_t)k;
+    for (int c = 0; c < 3; c++)
+        if (!(point[c] >= b->low[c] && point[c] <= b->high[c])) return;
+    if (touches->crowd->owner[touches->particle[k]] == member) return;
+    float weights[8], J[3][3], slope[3];
+    if (!invert(h, point, weights, J, slope) || !(depth_at(h, weights) < 0)) return;
+    int before = atomic_load_explicit(&touches->chosen[k], memory_order_relaxed);
+    while (cell < before &&
+           !atomic_compare_exchange_weak_explicit(&touches->chosen[k], &before, cell,
+                                                  memory_order_relaxed, memory_order_relaxed)) {
+    }
+}
+
+static void look_in_cell(pliant_touches *touches, int32_t member, int32_t cell)
+{
+    const pliant_hash *hash = &touches->hash;
+    hull h;
+    load_hull(touches->crowd, &touches->crowd->members[member], cell, &h);
+    const box b = box_of(&h);
+    if (!is_of_interest(touches, member, &h, &b)) return;
+    int32_t low[3], high[3];
+    pliant_hash_cell(hash, b.low, low);
+    pliant_hash_cell(hash, b.high, high);
+    for (int32_t z = low[2]; z <= high[2]; z++)
+        for (int32_t y = low[1]; y <= high[1]; y++) {
+            const pliant_hash_range range =
+                pliant_hash_find(hash, low[0], y, z, 0, high[0] - low[0]);
+            for (int r = 0; r < 2; r++)
+                for (int32_t k = range.from[r]; k < range.to[r]; k++)
+                    offer(touches, member, cell, &h, &b, k);
+        }
+}
+
+static void look_in_cells(void *context, int32_t task, int32_t worker)
+{
+    (void)worker;
+    pliant_touches *touches = context;
+    const pliant_crowd *crowd = touches->crowd;
+    const int32_t begin = task * DENT_TASK;
+    int32_t member = member_of_cell(crowd, begin);
+    for (int32_t cell = begin; cell < crowd->cell_count && cell < begin + DENT_TASK; cell++) {
+        while (cell >= crowd->members[member].cell_first + crowd->members[member].cell_count)
+            member++;
+        if (touches->overlaps.count[member] > 0) look_in_cell(touches, member, cell);
+    }
+}
+
+void pliant_dents_choose(pliant_touches *touches, pliant_team *team)
+{
+    for (int32_t k = 0; k < touches->hashed_count; k++)
+        atomic_store_explicit(&touches->chosen[k], PLIANT_NO_CELL, memory_order_relaxed);
+    const int32_t tasks = (touches->crowd->cell_count + DENT_TASK - 1) / DENT_TASK;
+    pliant_team_run(team, tasks, look_in_cells, touches);
+}
+
+// ---- The way out ----
+
+int32_t pliant_dents_find(pliant_touches *touches, int32_t participant, pliant_touch *touch)
+{
+    const pliant_crowd *crowd = touches->crowd;
+    const int32_t cell = atomic_load_explicit(&touches->chosen[participant], memory_order_relaxed);
+    if (cell == PLIANT_NO_CELL) return 0;
+    hull h;
+    load_hull(crowd, &crowd->members[member_of_cell(crowd, cell)], cell, &h);
+    pliant_touched_cell *touched = &touches->cells[participant];
+    float J[3][3], slope[3], n[3], turned[3][3];
+    const float *point = touches->hash.sorted + 4 * (size_t)participant;
+    if (!invert(&h, point, touched->weights, J, slope)) return 0;
+    // The depth's gradient in space: J^T n = slope.
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) turned[r][c] = J[c][r];
+    const float size = h.member->body->lattice->cell_size;
+    if (!solve((const float(*)[3])turned, slope, 1e-3f * size * size * size, n)) return 0;
+    const float steepness = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(steepness > NO_DIRECTION)) return 0;
+    const float out = -depth_at(&h, touched->weights) / steepness;
+    for (int k = 0; k < 8; k++) touched->corners[k] = h.member->first + h.particles[k];
+    *touch = (pliant_touch){.normal = {n[0] / steepness, n[1] / steepness, n[2] / steepness},
+                            .target = fminf(PART_SHARE * out / touches->dt, PART_SPEED * size),
+                            .a = participant,
+                            .b = -1};
+    return 1;
+}
