@@ -148,20 +148,27 @@ static box box_of(const hull *h)
     for (int c = 0; c < 3; c++) {
         b.low[c] = b.high[c] = h->x[0][c];
         for (int k = 1; k < 8; k++) {
-            b.low[c] = fminf(b.low[c], h->x[k][c]);
-            b.high[c] = fmaxf(b.high[c], h->x[k][c]);
+            b.low[c] = h->x[k][c] < b.low[c] ? h->x[k][c] : b.low[c];
+            b.high[c] = h->x[k][c] > b.high[c] ? h->x[k][c] : b.high[c];
         }
     }
     return b;
 }
 
-// 1: worth a look: below the surface somewhere, in one piece, near another body.
+// 1: some of it is below the surface.
+static int32_t is_below(const pliant_crowd *crowd, const pliant_member *member, int32_t cell)
+{
+    const int32_t *corners = crowd->corners + 8 * (size_t)cell;
+    const float *depth = crowd->depth + member->first;
+    for (int k = 0; k < 8; k++)
+        if (depth[corners[k]] < 0) return 1;
+    return 0;
+}
+
+// 1: worth a look: in one piece, near another body.
 static int32_t is_of_interest(const pliant_touches *touches, int32_t member, const hull *h,
                               const box *b)
 {
-    int32_t is_below = 0;
-    for (int k = 0; k < 8; k++) is_below |= h->depth[k] < 0;
-    if (!is_below) return 0;
     const float size = h->member->body->lattice->cell_size;
     float middle[3], reach = 0;
     for (int c = 0; c < 3; c++) {
@@ -192,8 +199,10 @@ static void offer(pliant_touches *touches, int32_t member, int32_t cell, const h
 static void look_in_cell(pliant_touches *touches, int32_t member, int32_t cell)
 {
     const pliant_hash *hash = &touches->hash;
+    const pliant_member *m = &touches->crowd->members[member];
+    if (!is_below(touches->crowd, m, cell)) return;
     hull h;
-    load_hull(touches->crowd, &touches->crowd->members[member], cell, &h);
+    load_hull(touches->crowd, m, cell, &h);
     const box b = box_of(&h);
     if (!is_of_interest(touches, member, &h, &b)) return;
     int32_t low[3], high[3];

@@ -50,6 +50,7 @@ void pliant_touches_lay_out(pliant_touches *touches, pliant_arena *arena, int32_
     PLIANT_TAKE(arena, touches->picked_count,
                 particle_capacity / PLIANT_CHUNK + (size_t)member_capacity + 1);
     PLIANT_TAKE(arena, touches->particle, touches->participant_capacity);
+    PLIANT_TAKE(arena, touches->rest, 4 * (size_t)particle_capacity);
     PLIANT_TAKE(arena, touches->velocity, 4 * (size_t)touches->participant_capacity);
     PLIANT_TAKE(arena, touches->participant_of, particle_capacity);
     PLIANT_TAKE(arena, touches->chosen, touches->participant_capacity);
@@ -137,6 +138,12 @@ static void load_velocities(void *context, int32_t task, int32_t worker)
         load_velocity(crowd, particle, touches->velocity + 4 * (size_t)k);
         touches->particle[k] = particle;
         touches->participant_of[particle] = k;
+        const int32_t member = crowd->owner[particle];
+        const pliant_member *m = &crowd->members[member];
+        int32_t *rest = touches->rest + 4 * (size_t)k;
+        memcpy(rest, m->body->lattice->places + 3 * (size_t)(particle - m->first),
+               3 * sizeof *rest);
+        rest[3] = member;
         atomic_store_explicit(&touches->chosen[k], PLIANT_NO_CELL, memory_order_relaxed);
     }
 }
@@ -165,6 +172,12 @@ static void add_corners(pliant_touches *touches)
 
 // ---- Pairs ----
 
+// fminf's care for NaN makes it a call.
+static float least(float a, float b)
+{
+    return a < b ? a : b;
+}
+
 typedef struct finder {
     pliant_touches *touches;
     pliant_touch *found;  // shape [TOUCH_TASK_ROOM]
@@ -181,16 +194,11 @@ static int is_inside(const pliant_touches *touches, int32_t k)
 // Whether two particles may touch at all, as they are at rest.
 static int may_touch(const pliant_touches *touches, int32_t k, int32_t other)
 {
-    const pliant_crowd *crowd = touches->crowd;
-    const int32_t a = touches->particle[k], b = touches->particle[other];
-    const int32_t member = crowd->owner[a];
-    if (member != crowd->owner[b])
+    const int32_t *p = touches->rest + 4 * (size_t)k, *q = touches->rest + 4 * (size_t)other;
+    if (p[3] != q[3])
         return (touches->collision & PLIANT_COLLISION_BODIES) && !is_inside(touches, k) &&
                !is_inside(touches, other);
     if (!(touches->collision & PLIANT_COLLISION_SELF)) return 0;
-    const pliant_member *m = &crowd->members[member];
-    const int32_t *p = m->body->lattice->places + 3 * (size_t)(a - m->first);
-    const int32_t *q = m->body->lattice->places + 3 * (size_t)(b - m->first);
     int32_t square = 0;
     for (int c = 0; c < 3; c++) square += (p[c] - q[c]) * (p[c] - q[c]);
     return square > SELF_NEAREST;
@@ -203,7 +211,7 @@ static void look_at_pair(finder *f, int32_t k, int32_t other)
     const float *y = touches->hash.sorted + 4 * (size_t)other;
     const float d[3] = {x[0] - y[0], x[1] - y[1], x[2] - y[2]};
     const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    if (!(square <= touches->size * touches->size)) return;
+    if (!(square <= touches->size * touches->size) || !may_touch(touches, k, other)) return;
     const float *v = touches->velocity + 4 * (size_t)k;
     const float *u = touches->velocity + 4 * (size_t)other;
     const float reach = touches->narrowing * (x[3] + y[3]), distance = sqrtf(square);
@@ -213,12 +221,11 @@ static void look_at_pair(finder *f, int32_t k, int32_t other)
     const float gap = distance - reach;
     const float speed = n[0] * (v[0] - u[0]) + n[1] * (v[1] - u[1]) + n[2] * (v[2] - u[2]);
     if (!(gap + touches->dt * speed < TOUCH_SLACK * reach)) return;
-    if (!may_touch(touches, k, other)) return;
     if (f->count == TOUCH_TASK_ROOM) {
         f->is_full = 1;
         return;
     }
-    const float part = fminf(PART_SHARE * -gap / touches->dt, PART_SPEED * reach);
+    const float part = least(PART_SHARE * -gap / touches->dt, PART_SPEED * reach);
     f->found[f->count++] = (pliant_touch){.normal = {n[0], n[1], n[2]},
                                           .target = gap >= 0 ? -gap / touches->dt : part,
                                           .a = k,

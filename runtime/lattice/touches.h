@@ -43,7 +43,8 @@ typedef struct pliant_touches {
     int32_t *picked;        // shape [particle_capacity]: crowd numbers of what was hashed
     int32_t *picked_count;  // shape [outer chunks]
     int32_t *particle;      // shape [participant_capacity]: crowd number
-    float *velocity;        // shape [participant_capacity][4]: v, m/s, and inverse mass, 1/kg
+    int32_t *rest;  // shape [particle_capacity][4]: of what is hashed: place in its lattice, member
+    float *velocity;          // shape [participant_capacity][4]: v, m/s, and inverse mass, 1/kg
     int32_t *participant_of;  // shape [particle_capacity]: of crowd numbers, or -1
     atomic_int *chosen;  // shape [participant_capacity]: cell of the crowd that a participant is
                          // inside of, or PLIANT_NO_CELL
