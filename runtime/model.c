@@ -332,8 +332,8 @@ int32_t pliant_model_from_source(const pliant_model *model, int32_t source)
 
 int32_t pliant_model_is_free(const pliant_model *model, int32_t vertex)
 {
-    if (vertex < 0 || vertex >= model->vertex_count) return -1;
-    return model->view.has_greens && model->domain[vertex] == PLIANT_DOMAIN_FREE;
+    if (vertex < 0 || vertex >= model->vertex_count || !model->view.has_greens) return -1;
+    return model->domain[vertex] == PLIANT_DOMAIN_FREE;
 }
 
 double pliant_model_area(const pliant_model *model, int32_t vertex)

@@ -61,8 +61,8 @@ PLIANT_API const double *pliant_model_positions(const pliant_model *model);
 PLIANT_API const int32_t *pliant_model_faces(const pliant_model *model, int32_t level);
 // Vertex of the model that is vertex `source` of the input mesh, or -1.
 PLIANT_API int32_t pliant_model_from_source(const pliant_model *model, int32_t source);
-PLIANT_API int32_t pliant_model_is_free(const pliant_model *model,
-                                        int32_t vertex);  // 1, 0; -1 out of range
+// 1, 0; -1: out of range, or there are no Green's functions.
+PLIANT_API int32_t pliant_model_is_free(const pliant_model *model, int32_t vertex);
 PLIANT_API double pliant_model_area(const pliant_model *model, int32_t vertex);  // a_i, m^2 (GF-4)
 // Free vertex whose rest position is nearest to `position` (shape [3], m); -1: there is none.
 PLIANT_API int32_t pliant_model_nearest(const pliant_model *model, const double *position);
