@@ -238,6 +238,13 @@ uint32_t pliant_links_row(const pliant_links *links, int32_t x, int32_t y, int32
     return row < 0 || x >= links->dims[0] ? 0 : window_bits(row_bits(links, row, ROW_LINKS + d), x);
 }
 
+int32_t pliant_links_is_whole(const pliant_links *links, int32_t x, int32_t y, int32_t z)
+{
+    const int32_t row = row_at(links, y, z);
+    if (row < 0 || x < 0 || x >= links->dims[0]) return 0;
+    return has_bit(row_bits(links, row, ROW_WHOLE), x);
+}
+
 uint32_t pliant_links_mask(const pliant_links *links, int32_t x, int32_t y, int32_t z)
 {
     uint32_t mask = 0;

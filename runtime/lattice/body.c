@@ -3,6 +3,7 @@
 
 #include "lattice/columns.h"
 #include "lattice/damping.h"
+#include "lattice/float_mode.h"
 #include "lattice/plates.h"
 #include "lattice/window.h"
 #include "pliant/error.h"
@@ -446,7 +447,9 @@ void pliant_body_move(pliant_body *body, float h)
 pliant_status pliant_body_step(pliant_body *body, float h)
 {
     if (!(h > 0) || !isfinite(h)) return PLIANT_ERR_ARGUMENT;
+    const pliant_float_mode before = pliant_float_mode_flush();
     pliant_body_match(body, h);
     pliant_body_move(body, h);
+    pliant_float_mode_set(before);
     return PLIANT_OK;
 }

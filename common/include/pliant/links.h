@@ -50,6 +50,8 @@ int32_t pliant_links_particle(const pliant_links *links, int32_t x, int32_t y, i
 int32_t pliant_links_has(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
 // Bit k: the particle at (x + k, y, z) is linked along direction d; 32 of them, x >= 0.
 uint32_t pliant_links_row(const pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
+// 1: the cell whose least corner this is is there, and all its corners are linked.
+int32_t pliant_links_is_whole(const pliant_links *links, int32_t x, int32_t y, int32_t z);
 void pliant_links_cut(pliant_links *links, int32_t x, int32_t y, int32_t z, int32_t d);
 // The directions that (x, y, z) is linked along, bit d for direction d.
 uint32_t pliant_links_mask(const pliant_links *links, int32_t x, int32_t y, int32_t z);

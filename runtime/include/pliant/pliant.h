@@ -597,6 +597,12 @@ PLIANT_CALL pliant_status pliant_body_set_rigid_damping(pliant_body *body, float
 // Of a body that was created with one; PLIANT_ERR_MISSING: it was not.
 PLIANT_CALL pliant_status pliant_body_set_strain_limit(pliant_body *body, float limit);
 PLIANT_API int64_t pliant_body_broken_count(const pliant_body *body);  // links broken so far
+// What holds together: piece[p] (shape [particle_count]) is the number of particle p's piece,
+// counted from 0 in the order of their first particles. Returns how many there are.
+PLIANT_API int32_t pliant_body_pieces(const pliant_body *body, int32_t *piece);
+// 1: a link between corners of the cell that carries this vertex of the surface is broken, so that
+// faces at the vertex should not be drawn; 0: none is; -1: no such vertex.
+PLIANT_API int32_t pliant_body_is_torn(const pliant_body *body, int32_t vertex);
 // Added to what acts on a particle in the next step, N; at once, N s.
 PLIANT_CALL pliant_status pliant_body_force(pliant_body *body, int32_t particle, pliant_vec3 force);
 PLIANT_CALL pliant_status pliant_body_impulse(pliant_body *body, int32_t particle,
