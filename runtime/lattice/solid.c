@@ -214,6 +214,15 @@ float pliant_solid_distance(const pliant_solid *solid, const float *y, float *no
     }
 }
 
+// 1: y is farther than `distance` from a ball around the solid: a quick look before a close one.
+static int32_t is_far(const pliant_solid *solid, const float *y, float distance)
+{
+    const float far = solid->reach + distance;
+    float square = 0;
+    for (int c = 0; c < 3; c++) square += (y[c] - solid->middle[c]) * (y[c] - solid->middle[c]);
+    return square > far * far;
+}
+
 int32_t pliant_solid_is_near(const pliant_solid *solid, const float *x, float radius, float motion)
 {
     float y[3];
@@ -222,12 +231,10 @@ int32_t pliant_solid_is_near(const pliant_solid *solid, const float *x, float ra
     if (solid->is_moving)
         reach += sqrtf(pose_dot(solid->shift, solid->shift)) +
                  solid->turn_size * (sqrtf(pose_dot(y, y)) + radius);
-    if (solid->kind == PLIANT_OBSTACLE_PLANE) return pose_dot(y, solid->axis) <= reach;
-    float square = 0;
-    for (int c = 0; c < 3; c++) square += (y[c] - solid->middle[c]) * (y[c] - solid->middle[c]);
-    // Not "greater": what is not a number is near everything.
-    const float far = reach + solid->reach;
-    return !(square > far * far);
+    if (is_far(solid, y, reach)) return 0;
+    float normal[3];
+    // Not "at most": what is not a number is near everything.
+    return !(pliant_solid_distance(solid, y, normal) > reach);
 }
 
 // ---- Contact ----
@@ -260,7 +267,7 @@ int32_t pliant_solid_hold_off(const pliant_solid *solid, const float *x, float d
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++) d[r] += solid->turn[3 * r + c] * (x[c] - solid->begin.p[c]);
     const float size = sqrtf(pose_dot(d, d));
-    if (pliant_solid_distance(solid, y, n) >= size) return 0;
+    if (is_far(solid, y, size) || pliant_solid_distance(solid, y, n) >= size) return 0;
     const float t = advance(solid, y, d, size, n);
     const float dn = pose_dot(d, n);
     if (t >= 1 || dn >= 0) return 0;
@@ -286,6 +293,7 @@ int32_t pliant_solid_expel(const pliant_solid *solid, float most, float *x)
 {
     float y[3], n[3], out[3];
     pose_to_frame(&solid->end, x, y);
+    if (is_far(solid, y, 0)) return 0;
     const float distance = pliant_solid_distance(solid, y, n);
     if (!(distance < 0)) return 0;
     pose_turn(&solid->end, n, out);
