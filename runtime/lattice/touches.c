@@ -238,10 +238,15 @@ static void look_at_row(finder *f, int32_t k, int32_t dy, int32_t dz)
     const pliant_hash *hash = &f->touches->hash;
     const int32_t *cell = hash->cell + 3 * (size_t)k;
     const int is_own = dy == 0 && dz == 0;
+    // Without self-collision most of what is near is the body's own.
+    const int32_t *rest = f->touches->rest;
+    const int32_t skipped =
+        f->touches->collision & PLIANT_COLLISION_SELF ? -1 : rest[4 * (size_t)k + 3];
     const pliant_hash_range range =
         pliant_hash_find(hash, cell[0], cell[1] + dy, cell[2] + dz, is_own ? 0 : 1, 1);
     for (int r = 0; r < 2; r++)
         for (int32_t other = range.from[r]; other < range.to[r]; other++) {
+            if (rest[4 * (size_t)other + 3] == skipped) continue;
             const int32_t *its = hash->cell + 3 * (size_t)other;
             const int32_t dx = its[0] - cell[0];
             if (dx > 1 || dx < (is_own ? 0 : -1) || its[1] != cell[1] + dy ||
