@@ -41,6 +41,6 @@ typedef struct pliant_exceptions {
     // which stands for nothing.
     int32_t *first;      // shape [count + 1]
     int32_t *other;      // shape [items]: who is lacked, and whose region lacks k
-    int8_t (*step)[4];   // shape [items]: its place less k's, and 1; all 0 for nothing
+    int16_t (*step)[4];  // shape [items]: its place less k's, and 1; all 0 for nothing
     uint8_t *is_listed;  // shape [count]: 1: the region's sums are mended by its list
 } pliant_exceptions;

@@ -350,7 +350,7 @@ static int32_t count_lacking(const pliant_reach *reach, int32_t w)
 // A pair is listed when the sums of either need it. Returns how many items particle k's list has;
 // -1: the other's region does not lack this one.
 static int32_t list_lacking(const pliant_lattice *lattice, const region_work *work, int32_t k,
-                            int32_t *others, int8_t (*steps)[4])
+                            int32_t *others, int16_t (*steps)[4])
 {
     const pliant_exceptions *e = &lattice->exceptions;
     const int32_t w = lattice->half_width;
@@ -367,7 +367,8 @@ static int32_t list_lacking(const pliant_lattice *lattice, const region_work *wo
                 if (!e->is_listed[k] && !e->is_listed[other]) continue;
                 if (others) {
                     others[count] = other;
-                    const int8_t step[4] = {(int8_t)(x - w), (int8_t)(y - w), (int8_t)(z - w), 1};
+                    const int16_t step[4] = {(int16_t)(x - w), (int16_t)(y - w), (int16_t)(z - w),
+                                             1};
                     memcpy(steps[count], step, sizeof step);
                 }
                 count++;

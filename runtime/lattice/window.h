@@ -21,7 +21,7 @@ typedef float pliant_f8 __attribute__((vector_size(32), may_alias));
 typedef float pliant_f8_anywhere __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int32_t pliant_bits8 __attribute__((vector_size(32)));
 typedef float pliant_f4 __attribute__((vector_size(16), aligned(4), may_alias));
-typedef int8_t pliant_bytes8 __attribute__((vector_size(8), aligned(1), may_alias));
+typedef int16_t pliant_shorts8 __attribute__((vector_size(16), aligned(2), may_alias));
 #define PLIANT_INLINE static inline __attribute__((always_inline))
 
 // (Macros: vectors as arguments and results would pass differently from clone to clone.)
@@ -35,7 +35,9 @@ typedef int8_t pliant_bytes8 __attribute__((vector_size(8), aligned(1), may_alia
 
 // Eight small whole numbers, as floats.
 #define pliant_f8_steps(p)                                                                         \
-    __builtin_convertvector(*(const pliant_bytes8 *)(const void *)(p), pliant_f8)
+    __builtin_convertvector(                                                                       \
+        __builtin_convertvector(*(const pliant_shorts8 *)(const void *)(p), pliant_bits8),         \
+        pliant_f8)
 
 // ---- Rows above each other ----
 
