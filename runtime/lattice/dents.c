@@ -8,11 +8,15 @@
 #include <math.h>
 #include <string.h>
 
-#define DENT_TASK     64  // cells of a task
-#define NEWTON_LIMIT  8
-#define NEWTON_STEP   1.5f  // cells: farther at once is no cell that can be inverted
-#define NEWTON_ENOUGH 1e-5f
-#define CELL_SLACK    1e-3f  // beyond a cell's faces, so that nothing falls between two
+#define DENT_TASK    64  // cells of a task
+#define NEWTON_LIMIT 8
+#define NEWTON_STEP  1.5f  // cells: farther at once is no cell that can be inverted
+// Steps double their digits: what this leaves is rounding.
+#define NEWTON_ENOUGH 1e-3f
+// From the middle, in cells, by the map there. A point of a cell is that far out at most while the
+// map at the middle is off by less than a quarter of a cell; cells bent more may miss some.
+#define BESIDE     0.75f
+#define CELL_SLACK 1e-3f  // beyond a cell's faces, so that nothing falls between two
 // Cells stretched to more than this, in cells, are torn or thrown about and hold nobody.
 #define CELL_STRETCH 4.0f
 // Depths that change by less than this part of the way are those of a shape's middle: no way out.
@@ -21,11 +25,18 @@
 #define PART_SHARE 0.1f
 #define PART_SPEED 10.0f  // cells a second
 
-// The corners of a cell of the crowd, and their depths.
+// The corners of a cell of the crowd, and their depths. Made for the first point that is looked at:
+// the cell's map as a polynomial about corner 0,
+//
+//     x = x_0 + p_1 a + p_2 b + p_3 ab + p_4 c + p_5 ac + p_6 bc + p_7 abc
+//
+// and its inverse at the middle, which tells that most points of the cell's box are beside it.
 typedef struct hull {
     const pliant_member *member;
     const int32_t *particles;  // of the member
     float x[8][3], depth[8];
+    int32_t is_made;
+    float p[8][3], middle[3], inverse[3][3];
 } hull;
 
 static int32_t member_of_cell(const pliant_crowd *crowd, int32_t cell)
@@ -42,6 +53,7 @@ static int32_t member_of_cell(const pliant_crowd *crowd, int32_t cell)
 static void load_hull(const pliant_crowd *crowd, const pliant_member *member, int32_t cell, hull *h)
 {
     h->member = member;
+    h->is_made = 0;
     h->particles = crowd->corners + 8 * (size_t)cell;
     for (int k = 0; k < 8; k++) {
         const int32_t p = h->particles[k], slot = member->body->lattice->slot[p];
@@ -71,62 +83,94 @@ static int32_t solve(const float m[3][3], const float r[3], float least, float t
     return 1;
 }
 
-// Weights of the corners at t, and their derivatives.
-static void find_weights(const float t[3], float weights[8], float slopes[8][3])
+// J[r][c] = dx_r / dt_c, and what is left of the way to the point (relative to corner 0).
+static void map(const hull *h, const float *point, const float t[3], float J[3][3], float left[3])
 {
-    for (int k = 0; k < 8; k++) {
-        const float a = k & 1 ? t[0] : 1 - t[0], b = k & 2 ? t[1] : 1 - t[1],
-                    d = k & 4 ? t[2] : 1 - t[2];
-        weights[k] = a * b * d;
-        slopes[k][0] = (k & 1 ? 1 : -1) * b * d;
-        slopes[k][1] = (k & 2 ? 1 : -1) * a * d;
-        slopes[k][2] = (k & 4 ? 1 : -1) * a * b;
+    const float a = t[0], b = t[1], c = t[2];
+    for (int r = 0; r < 3; r++) {
+        const float p3 = h->p[3][r], p5 = h->p[5][r], p6 = h->p[6][r], p7 = h->p[7][r];
+        J[r][0] = h->p[1][r] + p3 * b + p5 * c + p7 * b * c;
+        J[r][1] = h->p[2][r] + p3 * a + p6 * c + p7 * a * c;
+        J[r][2] = h->p[4][r] + p5 * a + p6 * b + p7 * a * b;
+        left[r] = point[r] - (J[r][0] * a + (h->p[2][r] + p6 * c) * b + h->p[4][r] * c);
     }
 }
 
-// J[r][c] = dx_r / dt_c, and what is left of the way to the point.
-static void map(const hull *h, const float *point, const float weights[8], const float slopes[8][3],
-                float J[3][3], float left[3])
+static float least_volume(const hull *h)
+{
+    const float size = h->member->body->lattice->cell_size;
+    return 1e-3f * size * size * size;
+}
+
+static void make(hull *h)
 {
     for (int r = 0; r < 3; r++) {
-        left[r] = point[r];
-        for (int c = 0; c < 3; c++) J[r][c] = 0;
+        float e[8];
+        for (int k = 0; k < 8; k++) e[k] = h->x[k][r] - h->x[0][r];
+        h->p[1][r] = e[1];
+        h->p[2][r] = e[2];
+        h->p[3][r] = e[3] - e[1] - e[2];
+        h->p[4][r] = e[4];
+        h->p[5][r] = e[5] - e[1] - e[4];
+        h->p[6][r] = e[6] - e[2] - e[4];
+        h->p[7][r] = e[7] - e[6] - e[5] - e[3] + e[1] + e[2] + e[4];
     }
-    for (int k = 0; k < 8; k++)
-        for (int r = 0; r < 3; r++) {
-            left[r] -= weights[k] * h->x[k][r];
-            for (int c = 0; c < 3; c++) J[r][c] += slopes[k][c] * h->x[k][r];
-        }
+    const float half[3] = {0.5f, 0.5f, 0.5f}, none[3] = {0, 0, 0};
+    float J[3][3], column[3];
+    map(h, none, half, J, h->middle);
+    for (int c = 0; c < 3; c++) {
+        const float unit[3] = {c == 0, c == 1, c == 2};
+        h->middle[c] = -h->middle[c];
+        if (!solve((const float(*)[3])J, unit, least_volume(h), column))
+            memset(column, 0, sizeof column);
+        for (int r = 0; r < 3; r++) h->inverse[r][c] = column[r];
+    }
+    h->is_made = 1;
 }
 
-// The place in the cell that the point is at: its corners' weights, the map's and the depth's
-// slopes there. 1: the point is in the cell.
-static int32_t invert(const hull *h, const float *point, float weights[8], float J[3][3],
-                      float slope[3])
+// The place t in the cell that the point is at, and the map's derivatives there. 1: it is in the
+// cell.
+static int32_t invert(hull *h, const float *x, float t[3], float J[3][3])
 {
-    float t[3] = {0.5f, 0.5f, 0.5f}, slopes[8][3], left[3], step[3];
-    const float size = h->member->body->lattice->cell_size, least = 1e-3f * size * size * size;
+    if (!h->is_made) make(h);
+    float point[3], left[3], step[3];
+    for (int c = 0; c < 3; c++) point[c] = x[c] - h->x[0][c];
+    for (int r = 0; r < 3; r++) {
+        const float *row = h->inverse[r];
+        t[r] = row[0] * (point[0] - h->middle[0]) + row[1] * (point[1] - h->middle[1]) +
+               row[2] * (point[2] - h->middle[2]);
+        if (!(fabsf(t[r]) <= BESIDE)) return 0;
+        t[r] += 0.5f;
+    }
     for (int i = 0; i < NEWTON_LIMIT; i++) {
-        find_weights(t, weights, slopes);
-        map(h, point, weights, (const float(*)[3])slopes, J, left);
-        if (!solve((const float(*)[3])J, left, least, step)) return 0;
+        map(h, point, t, J, left);
+        if (!solve((const float(*)[3])J, left, least_volume(h), step)) return 0;
         float farthest = 0;
         for (int c = 0; c < 3; c++) {
             t[c] += step[c];
-            farthest = fmaxf(farthest, fabsf(step[c]));
+            farthest = fabsf(step[c]) > farthest ? fabsf(step[c]) : farthest;
         }
         if (!(farthest <= NEWTON_STEP)) return 0;
         if (farthest > NEWTON_ENOUGH) continue;
         for (int c = 0; c < 3; c++)
             if (!(t[c] >= -CELL_SLACK && t[c] <= 1 + CELL_SLACK)) return 0;
-        find_weights(t, weights, slopes);
-        for (int c = 0; c < 3; c++) {
-            slope[c] = 0;
-            for (int k = 0; k < 8; k++) slope[c] += slopes[k][c] * h->depth[k];
-        }
         return 1;
     }
     return 0;
+}
+
+// Weights of the corners at t, and the slope of the depth.
+static void find_weights(const hull *h, const float t[3], float weights[8], float slope[3])
+{
+    memset(slope, 0, 3 * sizeof *slope);
+    for (int k = 0; k < 8; k++) {
+        const float a = k & 1 ? t[0] : 1 - t[0], b = k & 2 ? t[1] : 1 - t[1],
+                    d = k & 4 ? t[2] : 1 - t[2];
+        weights[k] = a * b * d;
+        slope[0] += (k & 1 ? 1 : -1) * b * d * h->depth[k];
+        slope[1] += (k & 2 ? 1 : -1) * a * d * h->depth[k];
+        slope[2] += (k & 4 ? 1 : -1) * a * b * h->depth[k];
+    }
 }
 
 static float depth_at(const hull *h, const float weights[8])
@@ -180,16 +224,18 @@ static int32_t is_of_interest(const pliant_touches *touches, int32_t member, con
     return pliant_overlaps_has(&touches->overlaps, touches->crowd, member, middle, 0.25f * reach);
 }
 
-static void offer(pliant_touches *touches, int32_t member, int32_t cell, const hull *h,
-                  const box *b, int32_t k)
+static void offer(pliant_touches *touches, int32_t member, int32_t cell, hull *h, const box *b,
+                  int32_t k)
 {
     const float *point = touches->hash.sorted + 4 * (size_t)k;
     for (int c = 0; c < 3; c++)
         if (!(point[c] >= b->low[c] && point[c] <= b->high[c])) return;
     if (touches->crowd->owner[touches->particle[k]] == member) return;
-    float weights[8], J[3][3], slope[3];
-    if (!invert(h, point, weights, J, slope) || !(depth_at(h, weights) < 0)) return;
     int before = atomic_load_explicit(&touches->chosen[k], memory_order_relaxed);
+    float weights[8], t[3], J[3][3], slope[3];
+    if (before <= cell || !invert(h, point, t, J)) return;
+    find_weights(h, t, weights, slope);
+    if (!(depth_at(h, weights) < 0)) return;
     while (cell < before &&
            !atomic_compare_exchange_weak_explicit(&touches->chosen[k], &before, cell,
                                                   memory_order_relaxed, memory_order_relaxed)) {
@@ -250,14 +296,15 @@ int32_t pliant_dents_find(pliant_touches *touches, int32_t participant, pliant_t
     hull h;
     load_hull(crowd, &crowd->members[member_of_cell(crowd, cell)], cell, &h);
     pliant_touched_cell *touched = &touches->cells[participant];
-    float J[3][3], slope[3], n[3], turned[3][3];
+    float t[3], J[3][3], slope[3], n[3], turned[3][3];
     const float *point = touches->hash.sorted + 4 * (size_t)participant;
-    if (!invert(&h, point, touched->weights, J, slope)) return 0;
+    if (!invert(&h, point, t, J)) return 0;
+    find_weights(&h, t, touched->weights, slope);
     // The depth's gradient in space: J^T n = slope.
     for (int r = 0; r < 3; r++)
         for (int c = 0; c < 3; c++) turned[r][c] = J[c][r];
     const float size = h.member->body->lattice->cell_size;
-    if (!solve((const float(*)[3])turned, slope, 1e-3f * size * size * size, n)) return 0;
+    if (!solve((const float(*)[3])turned, slope, least_volume(&h), n)) return 0;
     const float steepness = sqrtf(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     if (!(steepness > NO_DIRECTION)) return 0;
     const float out = -depth_at(&h, touched->weights) / steepness;
