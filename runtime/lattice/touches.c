@@ -19,7 +19,7 @@
 // Beyond touching, in ball diameters: what is seen at all of things that approach slowly, and at
 // most. Faster ones than the latter a step may pass a ball, but hardly a body of several.
 #define MARGIN_LEAST 0.1f
-#define MARGIN_MOST  1.0f
+#define MARGIN_MOST  0.5f
 
 // How near to touching after the step counts, in ball diameters.
 #define TOUCH_SLACK 0.02f
