@@ -375,16 +375,24 @@ static void scatter_slab(void *context, int32_t z, int32_t worker)
     pliant_plates_scatter(task->body, z, task->h, &task->body->scratch[worker]);
 }
 
-// The middle of some particles: the same whatever the number of threads.
+// The middle of some particles: the same whatever the number of threads. Their median, not their
+// mean: pieces and particles that fly far away must not take it along, or the rest, seen from afar,
+// would lose its digits.
 static void find_origin(pliant_body *body)
 {
+    enum { most = 32 };
     const pliant_lattice *lattice = body->lattice;
-    const int32_t step = lattice->particle_count / 64 + 1;
-    double sum[3] = {0};
+    const int32_t step = lattice->particle_count / most + 1;
+    float sorted[3][most];
     int32_t count = 0;
     for (int32_t p = 0; p < lattice->particle_count; p += step, count++)
-        for (int c = 0; c < 3; c++) sum[c] += body->x[lattice->slot[p] + PLIANT_LANES * c];
-    for (int c = 0; c < 3; c++) body->origin[c] = (float)(sum[c] / count);
+        for (int c = 0; c < 3; c++) {
+            const float x = body->x[lattice->slot[p] + PLIANT_LANES * c];
+            int32_t at = count;
+            for (; at > 0 && sorted[c][at - 1] > x; at--) sorted[c][at] = sorted[c][at - 1];
+            sorted[c][at] = x;
+        }
+    for (int c = 0; c < 3; c++) body->origin[c] = sorted[c][count / 2];
 }
 
 void pliant_body_match(pliant_body *body, float h)

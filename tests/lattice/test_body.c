@@ -195,6 +195,45 @@ static void goals_at_the_greatest_half_widths_equal_slow_sums(void **state)
     print_message("off by at most %.3f of the tolerance\n", worst);
 }
 
+// Whoever is far away is seen by those alone whose regions hold it: the others' goals keep their
+// digits. (Of 1e6 cells, a float holds sixteenths.)
+static void particles_thrown_far_away_spoil_their_own_regions_only(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(14);
+    static const check_cells shapes[] = {CHECK_CELLS_CUBE, CHECK_CELLS_COMB};
+    for (int s = 0; s < 2; s++)
+        for (int32_t w = 1; w <= 2; w++) {
+            pliant_body_def def = pliant_body_default();
+            def.strain_limit = 1e9f;  // sums are never mended by what is far away
+            lattice_pair *p = lattice_pair_create(shapes[s], 7, w, &def);
+            lattice_pair_deform(p, &random, 0.2);
+            lattice_pair_goals(p);
+            lattice_pair_tolerances(p);
+            const reference_lattice *l = p->slow;
+            // Two steps from the particle every goal is made of regions that do not hold it.
+            const int32_t n = p->particle_count, thrown = 0;
+            char *is_near = calloc((size_t)n, 1);
+            assert_non_null(is_near);
+            for (int32_t k = l->region_offset[thrown]; k < l->region_offset[thrown + 1]; k++)
+                for (int32_t m = l->region_offset[l->region[k]];
+                     m < l->region_offset[l->region[k] + 1]; m++)
+                    is_near[l->region[m]] = 1;
+            l->x[3 * thrown + 1] += 1e6 * p->cell_size;
+            lattice_pair_goals(p);
+            int32_t checked = 0;
+            for (int32_t i = 0; i < n; i++) {
+                if (is_near[i]) continue;
+                checked++;
+                for (int c = 0; c < 3; c++)
+                    check_near(p->goals[3 * i + c], p->slow_goals[3 * i + c], p->tolerance[i]);
+            }
+            check_at_least(checked, n / 2);
+            free(is_near);
+            lattice_pair_destroy(p);
+        }
+}
+
 // Rows of more than one block, and blocks apart from each other, along every axis.
 static void goals_of_long_bodies_equal_slow_sums(void **state)
 {
@@ -679,6 +718,7 @@ int main(void)
         cmocka_unit_test(goals_far_from_the_origin_are_as_exact),
         cmocka_unit_test(goals_of_breakable_bodies_equal_slow_sums),
         cmocka_unit_test(goals_at_the_greatest_half_widths_equal_slow_sums),
+        cmocka_unit_test(particles_thrown_far_away_spoil_their_own_regions_only),
         cmocka_unit_test(goals_of_long_bodies_equal_slow_sums),
         cmocka_unit_test(steps_follow_the_reference),
         cmocka_unit_test(damped_steps_follow_the_reference),

@@ -254,6 +254,39 @@ static void bodies_torn_apart_follow_the_reference(void **state)
         }
 }
 
+// ---- Pieces ----
+
+// Two pieces of one body. The smaller one flies a million cells away: the other's goals keep their
+// digits. Where the larger one leaves, sums are taken about it, and the smaller one's goals are as
+// exact as floats are at that distance: here of a thousand cells.
+static void pieces_that_fly_away_are_forgotten(void **state)
+{
+    (void)state;
+    check_random random = check_random_seed(7);
+    static const check_cells shapes[] = {CHECK_CELLS_CUBE, CHECK_CELLS_SPONGE, CHECK_CELLS_COMB};
+    for (int s = 0; s < 3; s++)
+        for (int32_t w = 1; w <= 3; w++)
+            for (int larger_leaves = 0; larger_leaves < 2; larger_leaves++) {
+                const pliant_body_def def = breakable(1);
+                lattice_pair *p = lattice_pair_create(shapes[s], 6, w, &def);
+                const double plane = larger_leaves ? 1.5 : 4.5;
+                check_at_least((double)cut_plane(p, 0, plane), 10);
+                lattice_pair_follow_breaks(p);
+                lattice_pair_deform(p, &random, 0.2);
+                lattice_pair_goals(p);
+                lattice_pair_tolerances(p);
+                for (int32_t i = 0; i < p->particle_count; i++)
+                    if (p->slow->particles[3 * i] > plane)
+                        p->slow->x[3 * i] += (larger_leaves ? 1e3 : 1e6) * p->cell_size;
+                lattice_pair_goals(p);
+                if (larger_leaves) lattice_pair_tolerances(p);  // with that extent
+                for (int32_t i = 0; i < p->particle_count; i++)
+                    for (int c = 0; c < 3 && p->slow->particles[3 * i] < plane; c++)
+                        check_near(p->goals[3 * i + c], p->slow_goals[3 * i + c], p->tolerance[i]);
+                lattice_pair_destroy(p);
+            }
+}
+
 static void momenta_are_kept_through_breaking(void **state)
 {
     (void)state;
@@ -387,6 +420,7 @@ int main(void)
         cmocka_unit_test(goals_after_staged_cuts_equal_rebuilt_regions),
         cmocka_unit_test(dust_stays_where_it_is),
         cmocka_unit_test(bodies_torn_apart_follow_the_reference),
+        cmocka_unit_test(pieces_that_fly_away_are_forgotten),
         cmocka_unit_test(momenta_are_kept_through_breaking),
         cmocka_unit_test(breaking_allocates_nothing),
         cmocka_unit_test(copies_take_what_is_broken),
