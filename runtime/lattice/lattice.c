@@ -335,6 +335,7 @@ typedef struct region_work {
     pliant_particle_constants *particle_constants;  // shape [block_count]
     pliant_region_constants *region_constants;      // shape [turn_count]
     int32_t *exception_of;                          // shape [particle_count]: index, or -1
+    uint64_t balance;                               // see list_lacking
     pliant_reach reach;
 } region_work;
 
@@ -347,9 +348,18 @@ static int32_t count_lacking(const pliant_reach *reach, int32_t w)
     return count;
 }
 
+// A number for the ordered pair (a, b): splitmix64 (Steele, Lea, Flood 2014).
+static uint64_t name_pair(int32_t a, int32_t b)
+{
+    uint64_t x = ((uint64_t)(uint32_t)a << 32 | (uint32_t)b) + 0x9e3779b97f4a7c15u;
+    x = (x ^ x >> 30) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ x >> 27) * 0x94d049bb133111ebu;
+    return x ^ x >> 31;
+}
+
 // A pair is listed when the sums of either need it. Returns how many items particle k's list has;
-// -1: the other's region does not lack this one.
-static int32_t list_lacking(const pliant_lattice *lattice, const region_work *work, int32_t k,
+// -1: the other's region lacks nothing. work->balance is left as it was when all lack each other.
+static int32_t list_lacking(const pliant_lattice *lattice, region_work *work, int32_t k,
                             int32_t *others, int16_t (*steps)[4])
 {
     const pliant_exceptions *e = &lattice->exceptions;
@@ -364,6 +374,7 @@ static int32_t list_lacking(const pliant_lattice *lattice, const region_work *wo
                 const int32_t other = work->exception_of[pliant_links_particle(
                     lattice->links, at[0] + x - w, at[1] + y - w, at[2] + z - w)];
                 if (other < 0) return -1;
+                work->balance += name_pair(k, other) - name_pair(other, k);
                 if (!e->is_listed[k] && !e->is_listed[other]) continue;
                 if (others) {
                     others[count] = other;
@@ -405,6 +416,7 @@ static pliant_status list_exceptions(pliant_lattice *lattice, region_work *work)
             if (count > INT32_MAX - e->first[k]) return PLIANT_ERR_MEMORY;
             e->first[k + 1] = e->first[k] + count;
         }
+        if (work->balance != 0) return PLIANT_ERR_FORMAT;
         if (pass > 0) break;
         lay_out_items(&lattice->items_arena, e);
         if (pliant_arena_reserve(&lattice->items_arena, NULL) < 0) return PLIANT_ERR_MEMORY;

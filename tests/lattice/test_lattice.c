@@ -256,6 +256,20 @@ static void regions_that_are_not_mutual_are_refused(void **state)
     assert_null(lattice);
     assert_non_null(strstr(err.text, "lacks a particle alone"));
     l->regions->region_node_count++;
+    // Or take one member away.
+    int32_t *plate = NULL;
+    const int32_t w = 2;
+    for (int32_t k = 0; k < l->regions->plate_node_count && !plate; k++)
+        for (int32_t y = 0; y <= 2 * w && !plate; y++) {
+            int32_t *mask = l->regions->plate_nodes + k * (2 * w + 4) + 3 + y;
+            if (*mask && !((uint32_t)*mask & PLIANT_ROW_WHOLE)) plate = mask;
+        }
+    assert_non_null(plate);
+    *plate &= *plate - 1;
+    lattice = NULL;
+    const pliant_status status = pliant_lattice_build(&def, &lattice, &err);
+    if (status >= 0) pliant_lattice_destroy(lattice);
+    assert_int_equal(status, PLIANT_ERR_FORMAT);
     check_lattice_destroy(l);
 }
 
