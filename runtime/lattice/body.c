@@ -111,6 +111,16 @@ static pliant_status check_def(const pliant_body_def *def, pliant_error *err)
     return PLIANT_OK;
 }
 
+static float bounded(float value, float limit)
+{
+    return value > limit ? limit : value < -limit ? -limit : value;
+}
+
+static pliant_vec3 bounded_all(pliant_vec3 a, float limit)
+{
+    return (pliant_vec3){bounded(a.x, limit), bounded(a.y, limit), bounded(a.z, limit)};
+}
+
 static void place(pliant_body *body, const pliant_body_def *def)
 {
     const pliant_lattice *lattice = body->lattice;
@@ -127,8 +137,10 @@ static void place(pliant_body *body, const pliant_body_def *def)
         const float *rest = lattice->rest + 3 * (size_t)p;
         for (int c = 0; c < 3; c++)
             body->x[lattice->slot[p] + PLIANT_LANES * c] =
-                from[c] + r[c][0] * rest[0] + r[c][1] * rest[1] + r[c][2] * rest[2];
-        pliant_body_set(body->v, lattice->slot[p], def->velocity);
+                bounded(from[c] + r[c][0] * rest[0] + r[c][1] * rest[1] + r[c][2] * rest[2],
+                        PLIANT_BODY_EXTENT * lattice->cell_size);
+        pliant_body_set(body->v, lattice->slot[p],
+                        bounded_all(def->velocity, PLIANT_BODY_SPEED * lattice->cell_size));
     }
     const float q[4] = {x, y, z, w};
     for (int32_t t = 0; t < lattice->turn_count; t++)
@@ -214,23 +226,26 @@ static int is_finite(pliant_vec3 a)
     return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
 }
 
-static pliant_status set_all(const pliant_body *body, const pliant_vec3 *values, float *array)
+// Beyond `limit` cells (per s), it is the limit.
+static pliant_status set_all(const pliant_body *body, const pliant_vec3 *values, float limit,
+                             float *array)
 {
     for (int32_t p = 0; p < body->lattice->particle_count; p++)
         if (!is_finite(values[p])) return PLIANT_ERR_ARGUMENT;
     for (int32_t p = 0; p < body->lattice->particle_count; p++)
-        pliant_body_set(array, body->lattice->slot[p], values[p]);
+        pliant_body_set(array, body->lattice->slot[p],
+                        bounded_all(values[p], limit * body->lattice->cell_size));
     return PLIANT_OK;
 }
 
 pliant_status pliant_body_set_positions(pliant_body *body, const pliant_vec3 *x)
 {
-    return set_all(body, x, body->x);
+    return set_all(body, x, PLIANT_BODY_EXTENT, body->x);
 }
 
 pliant_status pliant_body_set_velocities(pliant_body *body, const pliant_vec3 *v)
 {
-    return set_all(body, v, body->v);
+    return set_all(body, v, PLIANT_BODY_SPEED, body->v);
 }
 
 pliant_vec3 pliant_body_position(const pliant_body *body, int32_t particle)
@@ -242,7 +257,7 @@ pliant_vec3 pliant_body_position(const pliant_body *body, int32_t particle)
 pliant_status pliant_body_set_gravity(pliant_body *body, pliant_vec3 gravity)
 {
     if (!is_finite(gravity)) return PLIANT_ERR_ARGUMENT;
-    body->gravity = gravity;
+    body->gravity = bounded_all(gravity, PLIANT_BODY_SPEED * body->lattice->cell_size);
     return PLIANT_OK;
 }
 
@@ -284,8 +299,9 @@ static pliant_status add_by_mass(const pliant_body *body, int32_t particle, plia
     const float inverse = body->lattice->lane_inverse[block * PLIANT_LANES + slot % PLIANT_LANES];
     const pliant_vec3 old = pliant_body_get(array, slot);
     pliant_body_set(array, slot,
-                    (pliant_vec3){old.x + inverse * value.x, old.y + inverse * value.y,
-                                  old.z + inverse * value.z});
+                    bounded_all((pliant_vec3){old.x + inverse * value.x, old.y + inverse * value.y,
+                                              old.z + inverse * value.z},
+                                PLIANT_BODY_SPEED * body->lattice->cell_size));
     return PLIANT_OK;
 }
 

@@ -14,6 +14,9 @@
 // Coordinates and steps are kept within this many cells, so that nothing overflows on the way to
 // the squares of the sums.
 #define PLIANT_BODY_EXTENT 1e9f
+// So are speeds and accelerations that are given, in cells per s and per s^2: damping multiplies
+// them by the former.
+#define PLIANT_BODY_SPEED 1e12f
 
 // Nanoseconds of the last step, by phase; added up over threads' turns.
 typedef struct pliant_body_times {

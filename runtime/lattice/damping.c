@@ -40,6 +40,7 @@ enum { ALL_MASS, ALL_X, ALL_V = 4, ALL_SPIN = 7, ALL_XX = 10, ALL_COUNT = 16 };
 
 typedef struct rigid_motion {
     double centre[3], velocity[3], omega[3];  // about the origin of the sums
+    double spread;                            // mean square distance from the centre, m^2
 } rigid_motion;
 
 // The same as a + omega cross x, x from the body's origin.
@@ -136,6 +137,7 @@ static rigid_motion fit_whole(const double *sums)
     }
     for (int c = 0; c < 3; c++) square[c] = second[(c + 1) % 3] + second[(c + 2) % 3];
     solve_spin(square, product, spin, m.omega);
+    m.spread = (second[0] + second[1] + second[2]) / mass;
     return m;
 }
 
@@ -774,11 +776,31 @@ static void rigid_task(void *context, int32_t z, int32_t worker)
     blend_slab(task->body, z, &task->field, 1 - task->k, task->k);
 }
 
+// Squares of the sums lose what regions are made of when a body is torn over many times its size:
+// damping would add energy then, and end in what is no number. All that is slowed down then is
+// motion against the mean, which costs angular momentum. Pieces of what may break are summed apart
+// and may go further, and beyond that fly on undamped. Returns 1 if that was it.
+static int32_t damp_torn(damp_task *task)
+{
+    const double whole_sizes = 100, cells = 1e5;
+    pliant_body *body = task->body;
+    const int32_t *dims = body->lattice->dims;
+    const double a = (double)body->lattice->cell_size;
+    const double limit = a * (body->fracture ? cells : whole_sizes * (dims[0] + dims[1] + dims[2]));
+    if (task->whole.spread < limit * limit) return 0;
+    if (body->fracture) return 1;
+    for (int c = 0; c < 3; c++) task->whole.omega[c] = 0;
+    task->field = field_of(&task->whole);
+    pliant_team_run(body->team, dims[2], rigid_task, task);
+    return 1;
+}
+
 void pliant_body_damp(pliant_body *body, float k)
 {
     const pliant_lattice *lattice = body->lattice;
     damp_task task = {.body = body, .k = k};
     measure_whole(&task);
+    if (damp_torn(&task)) return;
     pliant_team_run(body->team, lattice->dims[2], gather_task, &task);
     pliant_team_run(body->team, lattice->column_count, fit_task, &task);
     pliant_team_run(body->team, lattice->dims[2], spread_task, &task);
@@ -795,5 +817,6 @@ void pliant_body_damp_rigid(pliant_body *body, float k)
 {
     damp_task task = {.body = body, .k = k};
     measure_whole(&task);
+    if (damp_torn(&task)) return;
     pliant_team_run(body->team, body->lattice->dims[2], rigid_task, &task);
 }
