@@ -262,6 +262,12 @@ bench: $(PROGRAMS) $(BENCHES) $(BENCH_MODELS) $(DETAIL_MODEL)  ## run the benchm
 	    case $$b in */bench_solver | */bench_contact | */bench_hierarchy | */bench_patch | */bench_tool | */bench_haptic) models="$(BENCH_MODELS)";; \
 	        */bench_detail) models="$(DETAIL_MODEL)";; *) models="";; esac; \
 	    PLIANT_BUILD=$(OUT) $$b $$models || exit 1; done
+# What a step of a lattice body costs; the cost against the half-width (LSM, Figure 4), drawn.
+FIGURES := runtime/lattice/figures
+bench-lattice: $(OUT)/tests/bench/bench_lattice $(OUT)/tests/bench/bench_width  ## measure lattice bodies and draw their cost again, 3 minutes
+	@$(OUT)/tests/bench/bench_lattice
+	@mkdir -p $(FIGURES); $(OUT)/tests/bench/bench_width $(FIGURES)/width.csv
+	@scripts/plot-fastlsm $(FIGURES)/width.csv > $(FIGURES)/width.svg
 
 # libFuzzer needs clang; everything the target needs is compiled with the sanitizers.
 FUZZ_SECONDS ?= 60
@@ -305,5 +311,5 @@ install: all $(OUT)/pliant.pc  ## install under PREFIX (/usr/local), staged by D
 	install -m 644 common/include/pliant/base.h runtime/include/pliant/pliant.h $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 644 $(OUT)/pliant.pc $(DESTDIR)$(PREFIX)/lib/pkgconfig
 
-.PHONY: always all runtime help configure clean tests check bench fuzz fuzzers headers layers format install
+.PHONY: always all runtime help configure clean tests check bench bench-lattice fuzz fuzzers headers layers format install
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)
