@@ -37,12 +37,11 @@ static void lay_out_scratch(pliant_arena *arena, const pliant_lattice *lattice, 
     PLIANT_TAKE(arena, scratch->turns, (size_t)longest * 12 * PLIANT_LANES);
     PLIANT_TAKE(arena, scratch->apart, (size_t)regions * 12);
     PLIANT_TAKE(arena, scratch->strip, strip);
-    PLIANT_TAKE(arena, scratch->repairs, (size_t)longest * 13 * PLIANT_LANES);
+    PLIANT_TAKE(arena, scratch->repairs, (size_t)longest * 16 * PLIANT_LANES);
     PLIANT_TAKE(arena, scratch->repair_of, longest);
     PLIANT_TAKE(arena, scratch->fit_rows, 15 * length);
     PLIANT_TAKE(arena, scratch->fit_bars,
                 (size_t)lattice->row_blocks * lattice->dims[1] * 15 * PLIANT_LANES);
-    PLIANT_TAKE(arena, scratch->fit_repairs, (size_t)longest * 16 * PLIANT_LANES);
 }
 
 static void lay_out(pliant_arena *arena, pliant_body *body)

@@ -75,12 +75,11 @@ typedef struct pliant_scratch {
     float *doubled;       // 4 padded rows
     float *turns;         // shape [longest column + 4w][12][8]: T_r of a column
     float *apart;         // shape [column_regions][12]: T_r of regions made of parts
-    float *repairs;       // shape [longest column][13][8]: what mends a block's sums
+    float *repairs;       // shape [longest column][16][8], see parts.h
     int32_t *repair_of;   // shape [longest column]: which, or -1
     const float **strip;  // rows of a window
     float *fit_rows;      // 15 padded rows
     float *fit_bars;      // shape [row_blocks][dims y][15][8]
-    float *fit_repairs;   // shape [longest column][16][8]
 } pliant_scratch;
 
 // v += (g - x) / h + h (gravity + a); then damping.

@@ -1,6 +1,7 @@
 // columns.c: shape matching of the regions of one column of blocks.
 #include "lattice/columns.h"
 
+#include "lattice/parts.h"
 #include "lattice/plates.h"
 #include "lattice/polar.h"
 #include "lattice/polar_block.h"
@@ -18,26 +19,8 @@ static const float zero_turn[TURN_FLOATS];
 
 // ---- Sums of irregular regions ----
 
-// What makes a block's window sums those of its regions: sums = keep * window + more, S, X, Y, Z.
-typedef struct repair {
-    float keep[PLIANT_LANES];
-    float more[12][PLIANT_LANES];
-} repair;
-
-_Static_assert(sizeof(repair) == 13 * PLIANT_LANES * sizeof(float), "scratch is sized by this");
-
-PLIANT_INLINE repair *repair_at(pliant_scratch *scratch, int32_t s, int32_t *count)
-{
-    repair *all = (repair *)(void *)scratch->repairs;
-    if (scratch->repair_of[s] >= 0) return &all[scratch->repair_of[s]];
-    repair *r = &all[scratch->repair_of[s] = (*count)++];
-    pliant_f8_store(r->keep, pliant_f8_all(1.0f));
-    for (int f = 0; f < 12; f++) pliant_f8_store(r->more[f], (pliant_f8){0});
-    return r;
-}
-
 // Less the particles that a region lacks, two at a time.
-PLIANT_INLINE void repair_listed(const pliant_body *body, int32_t k, repair *r, int32_t lane)
+PLIANT_INLINE void repair_listed(const pliant_body *body, int32_t k, float *repair)
 {
     const pliant_exceptions *e = &body->lattice->exceptions;
     pliant_f8 sum = {0}, x = {0}, y = {0}, z = {0};
@@ -53,65 +36,26 @@ PLIANT_INLINE void repair_listed(const pliant_body *body, int32_t k, repair *r, 
         z += value * pliant_f8_of(2, 2, 2, 2, 6, 6, 6, 6, step);
     }
     for (int c = 0; c < 3; c++) {
-        r->more[c][lane] = -(sum[c] + sum[4 + c]);
-        r->more[3 + c][lane] = -(x[c] + x[4 + c]);
-        r->more[6 + c][lane] = -(y[c] + y[4 + c]);
-        r->more[9 + c][lane] = -(z[c] + z[4 + c]);
+        repair[8 * c] = -(sum[c] + sum[4 + c]);
+        repair[8 * (3 + c)] = -(x[c] + x[4 + c]);
+        repair[8 * (6 + c)] = -(y[c] + y[4 + c]);
+        repair[8 * (9 + c)] = -(z[c] + z[4 + c]);
     }
 }
 
-// Less or instead: the sum of the region's parts.
-static void repair_parts(const pliant_body *body, const pliant_region_node *node,
-                         const pliant_part *parts, const float *sites, repair *r)
+PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, const float *sites,
+                                pliant_scratch *scratch)
 {
-    const int32_t w = body->lattice->half_width;
-    float total[12] = {0};
-    for (int32_t i = 0; i < node->part_count; i++) {
-        const float *site = sites + (size_t)parts[i].plane * PLIANT_SITE_FLOATS + node->lane;
-        const float *plate =
-            body->plate_sums + 9 * (size_t)(parts[i].plate < 0 ? 0 : parts[i].plate);
-        const float dz = (float)(parts[i].plane - w);
-        float part[9];
-        for (int f = 0; f < 9; f++) part[f] = parts[i].plate < 0 ? site[8 * f] : plate[f];
-        for (int f = 0; f < 9; f++) total[f] += part[f];
-        for (int f = 0; f < 3; f++) total[9 + f] += dz * part[f];
-    }
-    r->keep[node->lane] = node->sign < 0 ? 1 : 0;
-    for (int f = 0; f < 12; f++) r->more[f][node->lane] = (float)node->sign * total[f];
-}
-
-PLIANT_INLINE void find_repairs(const pliant_body *body, int32_t column, pliant_scratch *scratch)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const pliant_lattice_column *c = &lattice->columns[column];
-    const pliant_exceptions *e = &lattice->exceptions;
-    const pliant_irregular *irregular = body->irregular;
-    const int32_t width = 2 * lattice->half_width + 1;
-    int32_t count = 0;
-    for (int32_t s = 0; s < c->length; s++) scratch->repair_of[s] = -1;
+    const pliant_exceptions *e = &body->lattice->exceptions;
+    int32_t used = 0;
+    pliant_repairs_begin(scratch, body->lattice->columns[column].length);
     for (int32_t i = e->column_first[column]; i < e->column_first[column + 1]; i++) {
         const pliant_exception_place *place = &e->column_items[i];
-        const int32_t k = place->k;
-        if (!body->is_listed[k]) continue;
-        repair_listed(body, k, repair_at(scratch, place->s, &count), place->lane);
+        if (!body->is_listed[place->k]) continue;
+        float *repair = pliant_repair_at(scratch, place->s, 12, &used);
+        repair_listed(body, place->k, repair + 8 + place->lane);
     }
-    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
-        const pliant_region_node *node = &irregular->regions[n];
-        const int32_t s = node->z - c->z;
-        repair_parts(body, node, irregular->parts + (size_t)n * width,
-                     body->sites + (size_t)(c->first_site + s) * PLIANT_SITE_FLOATS,
-                     repair_at(scratch, s, &count));
-    }
-}
-
-PLIANT_INLINE void apply_repair(const pliant_scratch *scratch, int32_t s, float *sums)
-{
-    if (scratch->repair_of[s] < 0) return;
-    const repair *r = (const repair *)(const void *)scratch->repairs + scratch->repair_of[s];
-    const pliant_f8 keep = pliant_f8_load(r->keep);
-    for (int f = 0; f < 12; f++)
-        pliant_f8_store(sums + 8 * f,
-                        keep * pliant_f8_load(sums + 8 * f) + pliant_f8_load(r->more[f]));
+    pliant_repair_parts(body, column, sites, body->plate_sums, 9, 3, &used, scratch);
 }
 
 // ---- Matching ----
@@ -219,7 +163,7 @@ PLIANT_INLINE void match_regions(pliant_body *body, int32_t column, float *turns
             pliant_window_next(&window, s, 3, 6, sum, moment);
             for (int f = 0; f < 9; f++) pliant_f8_store(group.sums[i] + 8 * f, sum[f]);
             for (int f = 0; f < 3; f++) pliant_f8_store(group.sums[i] + 8 * (9 + f), moment[f]);
-            apply_repair(scratch, s, group.sums[i]);
+            pliant_repair_apply(scratch, s, 12, group.sums[i]);
         }
         if (block_count == 0) {
             memset(turns + (size_t)first * TURN_FLOATS, 0,
@@ -255,23 +199,6 @@ PLIANT_INLINE void list_turns(pliant_body *body, int32_t column, const float *tu
     }
 }
 
-// Regions made of their parts alone leave the windows; all that are made of parts are set aside.
-static void set_apart(const pliant_body *body, int32_t column, float *turns,
-                      pliant_scratch *scratch)
-{
-    const pliant_irregular *irregular = body->irregular;
-    float *apart = scratch->apart;
-    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next) {
-        const pliant_region_node *node = &irregular->regions[n];
-        float *turn =
-            turns + (size_t)(node->z - body->lattice->columns[column].z) * TURN_FLOATS + node->lane;
-        for (int f = 0; f < 12; f++, apart++) {
-            *apart = turn[8 * f];
-            if (node->sign > 0) turn[8 * f] = 0;
-        }
-    }
-}
-
 // Back along z: p of a plate is the sum of p + (z_plate - z_r) c.
 PLIANT_INLINE void spread_regions(pliant_body *body, int32_t column, const float *turns,
                                   pliant_scratch *scratch)
@@ -301,11 +228,7 @@ static void spread_apart(pliant_body *body, int32_t column, const pliant_scratch
     const pliant_irregular *irregular = body->irregular;
     const pliant_lattice_column *c = &body->lattice->columns[column];
     const int32_t w = body->lattice->half_width, width = 2 * w + 1;
-    for (int32_t n = irregular->column_head[column]; n >= 0; n = irregular->regions[n].next)
-        for (int32_t i = 0; i < irregular->regions[n].part_count; i++) {
-            const int32_t plate = irregular->parts[(size_t)n * width + i].plate;
-            if (plate >= 0) memset(body->plate_sums + 9 * (size_t)plate, 0, 9 * sizeof(float));
-        }
+    pliant_plates_clear(body, column, body->plate_sums, 9);
     const float *turn = scratch->apart;
     for (int32_t n = irregular->column_head[column]; n >= 0;
          n = irregular->regions[n].next, turn += 12) {
@@ -330,28 +253,16 @@ static void spread_apart(pliant_body *body, int32_t column, const pliant_scratch
     }
 }
 
-// Sites outside the lattice hold nothing; what the last step left there goes.
-static void clear_outside(pliant_body *body, int32_t column)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const pliant_lattice_column *c = &lattice->columns[column];
-    const int32_t w = lattice->half_width;
-    for (int32_t s = 0; s < c->length + 2 * w; s++) {
-        const int32_t z = c->z - w + s;
-        if (z < 0 || z >= lattice->dims[2] || lattice->slab_first[z] == lattice->slab_first[z + 1])
-            memset(body->sites + (size_t)(c->first_site + s) * PLIANT_SITE_FLOATS, 0,
-                   PLIANT_SITE_FLOATS * sizeof(float));
-    }
-}
-
 PLIANT_VECTOR_CLONES
 void pliant_column_match(pliant_body *body, int32_t column, pliant_scratch *scratch)
 {
-    clear_outside(body, column);
-    find_repairs(body, column, scratch);
+    const pliant_lattice *lattice = body->lattice;
+    float *sites = body->sites + (size_t)lattice->columns[column].first_site * PLIANT_SITE_FLOATS;
+    pliant_sites_clear(lattice, column, sites, 9);
+    find_repairs(body, column, sites, scratch);
     match_regions(body, column, scratch->turns, scratch);
     list_turns(body, column, scratch->turns);
-    set_apart(body, column, scratch->turns, scratch);
+    pliant_turns_set_apart(body, column, 12, scratch->turns, scratch);
     spread_regions(body, column, scratch->turns, scratch);
     spread_apart(body, column, scratch);
 }

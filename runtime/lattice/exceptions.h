@@ -44,3 +44,15 @@ typedef struct pliant_exceptions {
     int16_t (*step)[4];  // shape [items]: its place less k's, and 1; all 0 for nothing
     uint8_t *is_listed;  // shape [count]: 1: the region's sums are mended by its list
 } pliant_exceptions;
+
+struct pliant_lattice;
+
+// Room for an exception for every region node, and their places; the lists are still to come.
+PLIANT_UNUSED_RESULT pliant_status pliant_exceptions_reserve(struct pliant_lattice *lattice,
+                                                             const pliant_regions *regions);
+// The lists, once is_listed says whose sums need them. exception_of has shape [particle_count]: a
+// particle's index, or -1. PLIANT_ERR_FORMAT: one region lacks a particle whose own does not lack
+// it.
+PLIANT_UNUSED_RESULT pliant_status pliant_exceptions_list(struct pliant_lattice *lattice,
+                                                          const pliant_regions *regions,
+                                                          const int32_t *exception_of);
