@@ -210,6 +210,33 @@ static void energy_of_damped_bodies_falls_from_any_start(void **state)
     print_message("energy at most %.2f of what there was\n", greatest);
 }
 
+// ---- Stiffness ----
+
+// LSM Figure 2: two steps of smoothing leave the less of a pulled particle the wider regions are.
+// (bench_stiffness has the table.)
+static void wider_regions_are_stiffer(void **state)
+{
+    (void)state;
+    double last = INFINITY;
+    for (int32_t w = 1; w <= 5; w++) {
+        lattice_pair *p = lattice_pair_create(CHECK_CELLS_CUBE, 8, w, NULL);
+        lattice_pair_rest(p);
+        const int32_t middle = reference_lattice_find(p->slow, (const int32_t[3]){4, 4, 4});
+        p->slow->x[3 * middle] += 3 * p->cell_size;
+        for (int k = 0; k < 2; k++) {
+            memset(p->slow->v, 0, 3 * (size_t)p->particle_count * sizeof(double));
+            lattice_pair_set(p);
+            step(p, 1);
+            lattice_pair_read(p);
+        }
+        const double strain = lattice_pair_strain(p);
+        print_message("w = %d leaves strains of %.4f\n", w, strain);
+        check_at_most(strain, 0.9 * last);
+        last = strain;
+        lattice_pair_destroy(p);
+    }
+}
+
 // ---- Coming back ----
 
 // Steps until all links have their lengths to `strain`; -1: not within `most`.
@@ -374,6 +401,7 @@ int main(void)
         cmocka_unit_test(no_step_gains_more_elastic_energy_than_motion_had),
         cmocka_unit_test(energy_of_undamped_bodies_stays_bounded),
         cmocka_unit_test(energy_of_damped_bodies_falls_from_any_start),
+        cmocka_unit_test(wider_regions_are_stiffer),
         cmocka_unit_test(damped_bodies_come_back_from_anything),
         cmocka_unit_test(damped_bodies_come_back_from_far),
         cmocka_unit_test(huge_numbers_stay_finite),
