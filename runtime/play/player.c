@@ -2,6 +2,7 @@
 #include "player.h"
 
 #include "address.h"
+#include "condition_statement.h"
 #include "prop_statement.h"
 
 #include "pliant/error.h"
@@ -51,55 +52,6 @@ refuse(const pliant_player *player, const pliant_statement *statement, pliant_er
     va_end(arguments);
     return pliant_error_set(err, status, "%.300s:%lld:%d: %s", player->def.script_name,
                             (long long)statement->line, (int)statement->column, reason);
-}
-
-static const char *verb_of(pliant_statement_kind kind)
-{
-    switch (kind) {
-    case PLIANT_STATEMENT_DISPLACE:
-        return "displace";
-    case PLIANT_STATEMENT_TRACTION:
-        return "traction";
-    case PLIANT_STATEMENT_FORCE:
-        return "force";
-    case PLIANT_STATEMENT_SUPPORT:
-        return "support";
-    case PLIANT_STATEMENT_GRAVITY:
-        return "gravity";
-    case PLIANT_STATEMENT_RELEASE:
-        return "release";
-    default:
-        return "statement";
-    }
-}
-
-// Put a status that the solver gave into words.
-static pliant_status explain(const pliant_player *player, const pliant_statement *statement,
-                             pliant_node node, pliant_status status, pliant_error *err)
-{
-    const char *verb = verb_of(statement->kind);
-    pliant_error reason = {""};
-    switch (status) {
-    case PLIANT_ERR_MISSING:
-        if (statement->kind == PLIANT_STATEMENT_GRAVITY)
-            return refuse(player, statement, err, status,
-                          "gravity needs /body/gravity, which the model does not have");
-        if (!pliant_address_is_stored(player->model, node.level, &reason))
-            return refuse(player, statement, err, status, "%s", reason.text);
-        return refuse(player, statement, err, status,
-                      "%s at the fixed vertex %d needs a model precomputed with --blocks all", verb,
-                      (int)node.vertex);
-    case PLIANT_ERR_CAPACITY:
-        return refuse(player, statement, err, status,
-                      "%s: no more nodes can be changed than the model's %d", verb,
-                      (int)player->info.vertex_count);
-    case PLIANT_ERR_MEMORY:
-        return refuse(player, statement, err, status, "%s: no memory for one more changed node",
-                      verb);
-    default:
-        return refuse(player, statement, err, status, "%s refused for vertex %d: %s", verb,
-                      (int)node.vertex, pliant_status_name(status));
-    }
 }
 
 // ---- Life ----
@@ -172,92 +124,15 @@ static pliant_status resolve(const pliant_player *player, const pliant_statement
     return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
 }
 
-// The statement's vector times `scale`, in single precision.
-static pliant_status value_of(const pliant_player *player, const pliant_statement *statement,
-                              double scale, pliant_vec3 *value, pliant_error *err)
-{
-    float v[3];
-    for (int c = 0; c < 3; c++) {
-        v[c] = (float)(statement->value[c] * scale);
-        if (!isfinite(v[c]))
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "%g is beyond single precision", statement->value[c] * scale);
-    }
-    *value = (pliant_vec3){v[0], v[1], v[2]};
-    return PLIANT_OK;
-}
-
 // ---- Statements ----
 
 static pliant_status execute_condition(pliant_player *player, const pliant_statement *statement,
                                        pliant_error *err)
 {
-    pliant_condition condition = {.kind = PLIANT_CONDITION_PRESSED};
-    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_NODE, &condition.node, err);
-    if (status < 0) return status;
-    const int32_t vertex = condition.node.vertex;
-    const pliant_prop *owner = pliant_props_owner(player->props, vertex);
-    if (owner)
-        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                      "vertex %d belongs to patch %s: \"patch %s release %d\" first", (int)vertex,
-                      owner->name, owner->name, (int)vertex);
-    const int is_free = pliant_model_is_free(player->model, vertex) == 1;
-    double scale = 1;
-    switch (statement->kind) {
-    case PLIANT_STATEMENT_DISPLACE:
-        if (!is_free)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "vertex %d is fixed: displace needs a free one (support moves it)",
-                          (int)vertex);
-        condition.kind = PLIANT_CONDITION_DISPLACED;
-        break;
-    case PLIANT_STATEMENT_SUPPORT:
-        if (is_free)
-            return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                          "vertex %d is free: support needs a fixed one (displace moves it)",
-                          (int)vertex);
-        condition.kind = PLIANT_CONDITION_SUPPORTED;
-        break;
-    case PLIANT_STATEMENT_FORCE: {
-        // f = a p (GF-4), a the area of the hat. No columns, no area: the solver refuses.
-        const double area = pliant_model_node_area(player->model, condition.node);
-        if (area > 0) scale = 1 / area;
-        break;
-    }
-    default:
-        break;
-    }
-    status = value_of(player, statement, scale, &condition.value, err);
-    if (status < 0) return status;
-    status = pliant_conditions_set(player->conditions, &condition);
-    return status < 0 ? explain(player, statement, condition.node, status, err) : PLIANT_OK;
-}
-
-static pliant_status execute_gravity(pliant_player *player, const pliant_statement *statement,
-                                     pliant_error *err)
-{
-    pliant_vec3 g;
-    pliant_status status = value_of(player, statement, 1, &g, err);
-    if (status < 0) return status;
-    status = pliant_conditions_set_gravity(player->conditions, g);
-    if (status < 0)
-        return explain(player, statement, (pliant_node){player->finest, 0}, status, err);
-    return PLIANT_OK;
-}
-
-static pliant_status execute_release(pliant_player *player, const pliant_statement *statement,
-                                     pliant_error *err)
-{
-    if (statement->vertex.kind == PLIANT_VERTEX_ALL) {
-        pliant_props_drop_all(player->props);
-        pliant_conditions_drop_all(player->conditions);
-        return PLIANT_OK;
-    }
-    pliant_node node;
-    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_NODE, &node, err);
-    if (status < 0) return status;
-    status = pliant_conditions_drop(player->conditions, node.vertex);
-    return status < 0 ? explain(player, statement, node, status, err) : PLIANT_OK;
+    pliant_error reason = {""};
+    const pliant_status status = pliant_condition_statement_execute(
+        player->conditions, player->props, player->model, statement, &reason);
+    return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
 }
 
 static pliant_status execute_prop(pliant_player *player, const pliant_statement *statement,
@@ -298,6 +173,9 @@ static pliant_status reserve_probe(pliant_player *player)
 static pliant_status execute_probe(pliant_player *player, const pliant_statement *statement,
                                    pliant_error *err)
 {
+    if (statement->has_instance)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "instances are a lattice's: expected a vertex");
     if (player->def.probe_rule == PLIANT_PROBES_FIRST && player->last.number > 0)
         return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
                       "probe %s after a step: with rows written per step (-o, --json), probes must "
@@ -477,11 +355,9 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
     case PLIANT_STATEMENT_TRACTION:
     case PLIANT_STATEMENT_FORCE:
     case PLIANT_STATEMENT_SUPPORT:
-        return execute_condition(player, statement, err);
     case PLIANT_STATEMENT_GRAVITY:
-        return execute_gravity(player, statement, err);
     case PLIANT_STATEMENT_RELEASE:
-        return execute_release(player, statement, err);
+        return execute_condition(player, statement, err);
     case PLIANT_STATEMENT_PATCH:
     case PLIANT_STATEMENT_PATCH_DISPLACE:
     case PLIANT_STATEMENT_PATCH_RELEASE:
@@ -501,10 +377,12 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
         return execute_step(player, statement, observer, err);
     case PLIANT_STATEMENT_EXPECT:
         return execute_expect(player, statement, observer, err);
+    default:
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "%s is about a lattice: expected statements about Green's functions",
+                      pliant_statement_keyword(statement->kind, statement->shape));
     }
-    return refuse(player, statement, err, PLIANT_ERR_ARGUMENT, "unknown statement");
 }
-
 // A refusal that the next line may survive: the script's or the model's, not the machine's.
 static int is_refusal(pliant_status status)
 {

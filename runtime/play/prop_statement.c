@@ -82,6 +82,7 @@ static pliant_status execute_tool(pliant_props *props, const pliant_statement *s
     case PLIANT_SHAPE_CAPSULE:
         tool.kind = PLIANT_TOOL_CAPSULE;
         break;
+    case PLIANT_SHAPE_BOX:  // no tool, says the parser
     case PLIANT_SHAPE_NONE:
         break;
     }
@@ -113,6 +114,11 @@ pliant_status pliant_prop_statement_execute(pliant_props *props, const pliant_mo
         return pliant_props_set_proxy(props, statement->name, statement->value,
                                       statement->stiffness, statement->friction, reason);
     case PLIANT_STATEMENT_MOVE:
+        if (statement->count > 0)
+            return pliant_error_set(reason, PLIANT_ERR_ARGUMENT,
+                                    "move %s over %lld steps: only what acts on a lattice moves "
+                                    "over steps",
+                                    statement->name, (long long)statement->count);
         return pliant_props_move(props, statement->name, statement->value, reason);
     case PLIANT_STATEMENT_DROP:
         return pliant_props_drop(props, statement->name, reason);

@@ -212,12 +212,148 @@ static void mistakes_in_patches_tools_and_proxies_are_placed_and_explained(void 
     check_refused("drop a b", "s:7:8: expected the end of the line, found \"b\"");
 }
 
+static void statements_on_lattices_are_understood(void **state)
+{
+    (void)state;
+    pliant_statement s = parse("instances 150");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_INSTANCES);
+    assert_int_equal(s.count, 150);
+    assert_true(s.copies.seed == -1);
+    assert_int_equal(s.copies.has_step, 0);
+    assert_int_equal(s.copies.columns + s.copies.rows, 0);
+    s = parse("instances 8 rows 3 at 1 2 3 columns 2 step 4 5 6 random 7 velocity 0 0 -1");
+    check_near(s.value[1], 2, 0);
+    check_near(s.end[2], 6, 0);
+    assert_int_equal(s.copies.has_step, 1);
+    assert_int_equal(s.copies.columns, 2);
+    assert_int_equal(s.copies.rows, 3);
+    assert_true(s.copies.seed == 7);
+    check_near(s.copies.velocity[2], -1, 0);
+    s = parse("damping 0.25");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_DAMPING);
+    check_near(s.scalar, 0.25, 0);
+    assert_int_equal(s.count, 1);
+    assert_int_equal(parse("damping 1 every 4").count, 4);
+    assert_int_equal(parse("rigid-damping 0").kind, PLIANT_STATEMENT_RIGID_DAMPING);
+    check_near(parse("strain-limit 1.5").scalar, 1.5, 0);
+    s = parse("grab 12 hand");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_GRAB);
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_MODEL);
+    assert_int_equal(s.vertex.number, 12);
+    assert_string_equal(s.name, "hand");
+    assert_string_equal(parse("grab 12").name, "");
+    s = parse("grab instance 3 near 1 2 3 radius 0.5 hand");
+    assert_int_equal(s.has_instance, 1);
+    assert_int_equal(s.instance, 3);
+    assert_int_equal(s.vertex.kind, PLIANT_VERTEX_NEAR);
+    check_near(s.vertex.position[2], 3, 0);
+    check_near(s.scalar, 0.5, 0);
+    assert_string_equal(s.name, "hand");
+    assert_string_equal(parse("grab near 1 2 3 radiant").name, "radiant");
+    assert_int_equal(parse("let hand").kind, PLIANT_STATEMENT_LET);
+    s = parse("impulse near 1 2 3 4 5 6");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_IMPULSE);
+    check_near(s.value[2], 6, 0);
+    s = parse("plane 0 0 1 -0.5");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_OBSTACLE);
+    assert_int_equal(s.shape, PLIANT_SHAPE_PLANE);
+    check_near(s.scalar, -0.5, 0);
+    assert_string_equal(s.name, "");
+    s = parse("sphere 1 2 3 4 friction 0.5 as ball");
+    assert_int_equal(s.shape, PLIANT_SHAPE_SPHERE);
+    check_near(s.friction, 0.5, 0);
+    assert_string_equal(s.name, "ball");
+    s = parse("box 0 0 0 1 2 3 as crate");
+    assert_int_equal(s.shape, PLIANT_SHAPE_BOX);
+    check_near(s.end[1], 2, 0);
+    assert_int_equal(parse("capsule 1 2 3 4 5 6 7").shape, PLIANT_SHAPE_CAPSULE);
+    assert_int_equal(parse("collide none").count, PLIANT_COLLIDE_NONE);
+    assert_int_equal(parse("collide self").count, PLIANT_COLLIDE_SELF);
+    assert_int_equal(parse("collide bodies").count, PLIANT_COLLIDE_BODIES);
+    assert_int_equal(parse("collide all").count, 3);
+    s = parse("bone arm 1 2 3");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_BONE);
+    check_near(s.value[0], 1, 0);
+    s = parse("bind arm near 1 2 3 radius 2");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_BIND);
+    assert_string_equal(s.name, "arm");
+    check_near(s.scalar, 2, 0);
+    s = parse("turn arm 0 0 2 -90 over 30");
+    assert_int_equal(s.kind, PLIANT_STATEMENT_TURN);
+    check_near(s.scalar, -90, 0);
+    assert_int_equal(s.count, 30);
+    assert_int_equal(parse("move hand 1 2 3").count, 0);
+    assert_int_equal(parse("move hand 1 2 3 over 20").count, 20);
+    s = parse("probe p instance 4 vertex 5");
+    assert_int_equal(s.instance, 4);
+    assert_int_equal(s.vertex.number, 5);
+    assert_int_equal(parse("probe p near 1 2 3").has_instance, 0);
+}
+
+static void mistakes_on_lattices_are_placed_and_explained(void **state)
+{
+    (void)state;
+    check_refused("instances 0", "s:7:11: expected a number of instances, 1 to 1000000, found \"0\"");
+    check_refused("instances 2 on 1 2 3", "s:7:13: expected at, step, columns, rows, random or velocity, found \"on\"");
+    check_refused("instances 2 at 1 2", "s:7:19: expected z, a number, found the end of the line");
+    check_refused("instances 2 columns 0", "s:7:21: expected a number of columns, 1 or more, found \"0\"");
+    check_refused("instances 2 random -1", "s:7:20: expected a seed, a whole number from 0, found \"-1\"");
+    check_refused("damping 1.5", "s:7:9: expected a damping, a number from 0 to 1, found \"1.5\"");
+    check_refused("damping 1 every 0", "s:7:17: expected a number of steps, 1 or more, found \"0\"");
+    check_refused("damping 1 4", "s:7:11: expected the end of the line, found \"4\"");
+    check_refused("rigid-damping -1", "s:7:15: expected a damping, a number from 0 to 1, found \"-1\"");
+    check_refused("strain-limit -1", "s:7:14: expected a strain limit, a number >= 0, found \"-1\"");
+    check_refused("grab hand", "s:7:6: expected a particle: K or near X Y Z, found \"hand\"");
+    check_refused("grab instance x 1 h", "s:7:15: expected the number of an instance, from 0, found \"x\"");
+    check_refused("grab near 1 2 3 radius 0 h", "s:7:24: expected a radius, a number > 0, found \"0\"");
+    check_refused("grab 1 a/b", "s:7:8: expected a name of letters, digits, _ - ., found \"a/b\"");
+    check_refused("grab 1 a b", "s:7:10: expected the end of the line, found \"b\"");
+    check_refused("let", "s:7:4: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("impulse 3 1 2", "s:7:14: expected z, a number, found the end of the line");
+    check_refused("plane 0 0 0 1", "s:7:7: expected a normal that is not 0 0 0, found \"0\"");
+    check_refused("sphere 0 0 0 -1", "s:7:14: expected a radius, a number > 0, found \"-1\"");
+    check_refused("sphere 0 0 0 1 as", "s:7:18: expected a name of letters, digits, _ - ., found the end of the line");
+    check_refused("sphere 0 0 0 1 ball", "s:7:16: expected the end of the line, found \"ball\"");
+    check_refused("box 0 0 0 1 0 1", "s:7:11: expected a corner that is greater than the first in x, y and z, found \"1\"");
+    check_refused("tool t box 0 0 0 1 1 1", "s:7:8: expected sphere, plane or capsule, found \"box\"");
+    check_refused("collide everything", "s:7:9: expected none, self, bodies or all, found \"everything\"");
+    check_refused("turn a 0 0 0 9", "s:7:8: expected an axis that is not 0 0 0, found \"0\"");
+    check_refused("turn a 0 0 1", "s:7:13: expected an angle in degrees, a number, found the end of the line");
+    check_refused("move a 0 0 1 over 0", "s:7:19: expected a number of steps, 1 or more, found \"0\"");
+    check_refused("bind arm", "s:7:9: expected a particle: K or near X Y Z, found the end of the line");
+}
+
+static void every_statement_has_a_family_and_its_keyword(void **state)
+{
+    (void)state;
+    const struct {
+        const char *line, *keyword;
+        pliant_statement_family family;
+    } cases[] = {
+        {"probe p vertex 1", "probe", PLIANT_FAMILY_COMMON},
+        {"gravity 0 0 1", "gravity", PLIANT_FAMILY_COMMON},
+        {"move a 1 2 3", "move", PLIANT_FAMILY_COMMON},
+        {"step", "step", PLIANT_FAMILY_COMMON},
+        {"displace 1 0 0 0", "displace", PLIANT_FAMILY_GREENS},
+        {"patch p 1 0 0 0", "patch", PLIANT_FAMILY_GREENS},
+        {"deadline none", "deadline", PLIANT_FAMILY_GREENS},
+        {"tool t sphere 0 0 0 1", "tool", PLIANT_FAMILY_GREENS},
+        {"sphere 0 0 0 1", "sphere", PLIANT_FAMILY_LATTICE},
+        {"grab 1", "grab", PLIANT_FAMILY_LATTICE},
+        {"instances 2", "instances", PLIANT_FAMILY_LATTICE},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const pliant_statement s = parse(cases[i].line);
+        assert_int_equal(pliant_statement_family_of(s.kind), cases[i].family);
+        assert_string_equal(pliant_statement_keyword(s.kind, s.shape), cases[i].keyword);
+    }
+}
+
 static void mistakes_are_placed_and_explained(void **state)
 {
     (void)state;
-    check_refused("shove 1 2 3", "s:7:1: expected probe, displace, traction, force, support, gravity, "
-                                 "release, patch, contact, tool, proxy, move, drop, deadline, dt, step or "
-                                 "expect, found \"shove\"");
+    check_refused("shove 1 2 3", "s:7:1: expected a statement such as probe, displace, grab, step or "
+                                 "expect (--help lists all), found \"shove\"");
     check_refused("pliant-script 1", "s:7:1: expected pliant-script as first statement only, found \"pliant-script\"");
     check_refused("displace", "s:7:9: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found the end of the line");
     check_refused("displace -1 0 0 0", "s:7:10: expected a vertex: [L:]K, [L:]source K or [L:]near X Y Z, found \"-1\"");
@@ -360,6 +496,9 @@ int main(void)
         cmocka_unit_test(every_statement_is_understood),
         cmocka_unit_test(patches_tools_and_proxies_are_understood),
         cmocka_unit_test(mistakes_in_patches_tools_and_proxies_are_placed_and_explained),
+        cmocka_unit_test(statements_on_lattices_are_understood),
+        cmocka_unit_test(mistakes_on_lattices_are_placed_and_explained),
+        cmocka_unit_test(every_statement_has_a_family_and_its_keyword),
         cmocka_unit_test(mistakes_are_placed_and_explained),
         cmocka_unit_test(columns_count_characters_not_bytes),
         cmocka_unit_test(first_statement_must_be_the_version),

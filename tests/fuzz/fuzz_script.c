@@ -30,6 +30,10 @@ static const char *const seeds[] = {
     "pliant-script 1\nproxy pen 1 2 3 stiffness 100 friction 1\nstep\n",
     "pliant-script 1\ndeadline 200\nstep\ndeadline none\n",
     "pliant-script 1\nrelease 812\nrelease all\nexpect nose 0 0 -0.02 1e-3\n\n# \xc3\xa4\n",
+    "pliant-script 1\ninstances 9 at 0 0 1 step 1 1 1 columns 3 random 7\ndamping 0.5 every 2\n"
+    "grab instance 1 near 0 0 1 radius 2 hand\nmove hand 0 0 2 over 9\nlet hand\n",
+    "pliant-script 1\nplane 0 0 1 0 friction 1\nbox 0 0 0 1 1 1 as crate\ncollide all\nimpulse 3 0 0 "
+    "1\nbone arm 0 0 1\nbind arm 7\nturn arm 0 0 1 90\nstrain-limit 2\n",
     "pliant-script 2\n",
     "step x\nrelease\ndt -1\nexpect a,b\ngravity nan inf 1e999\n",
 };
@@ -65,7 +69,14 @@ static void check_statement(const pliant_statement *s)
     if (s->kind == PLIANT_STATEMENT_DEADLINE && (s->count < -1 || s->count > 1000000000)) abort();
     if (s->kind == PLIANT_STATEMENT_DT && !(s->scalar > 0)) abort();
     if (!(s->friction >= 0) || !(s->stiffness >= 0) || !isfinite(s->friction + s->stiffness)) abort();
-    if ((s->kind == PLIANT_STATEMENT_TOOL) != (s->shape != PLIANT_SHAPE_NONE)) abort();
+    if ((s->kind == PLIANT_STATEMENT_TOOL || s->kind == PLIANT_STATEMENT_OBSTACLE) !=
+        (s->shape != PLIANT_SHAPE_NONE))
+        abort();
+    if (!(isfinite(s->copies.velocity[0]) && isfinite(s->copies.velocity[1]) &&
+          isfinite(s->copies.velocity[2]))) abort();
+    if (s->instance < 0 || (!s->has_instance && s->instance != 0)) abort();
+    if (pliant_statement_family_of(s->kind) == PLIANT_FAMILY_COMMON && s->shape != PLIANT_SHAPE_NONE)
+        abort();
     if (s->shape == PLIANT_SHAPE_PLANE && s->value[0] == 0 && s->value[1] == 0 && s->value[2] == 0)
         abort();
     if ((s->shape == PLIANT_SHAPE_SPHERE || s->shape == PLIANT_SHAPE_CAPSULE) && !(s->scalar > 0))

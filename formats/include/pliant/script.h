@@ -29,13 +29,33 @@ typedef enum pliant_statement_kind {
     PLIANT_STATEMENT_CONTACT,         // contact tolerance T
     PLIANT_STATEMENT_TOOL,            // tool NAME SHAPE [friction MU]
     PLIANT_STATEMENT_PROXY,           // proxy NAME X Y Z [stiffness K] [friction MU]
-    PLIANT_STATEMENT_MOVE,            // move NAME X Y Z
+    PLIANT_STATEMENT_MOVE,            // move NAME X Y Z [over COUNT]
     PLIANT_STATEMENT_DROP,            // drop NAME
     PLIANT_STATEMENT_DEADLINE,        // deadline MICROSECONDS | deadline none
     PLIANT_STATEMENT_DT,              // dt SECONDS
     PLIANT_STATEMENT_STEP,            // step [COUNT]
     PLIANT_STATEMENT_EXPECT,          // expect NAME X Y Z TOLERANCE
+    // On lattices; PARTICLES is [instance I] K or [instance I] near X Y Z [radius R].
+    PLIANT_STATEMENT_INSTANCES,      // instances N CLAUSES
+    PLIANT_STATEMENT_DAMPING,        // damping K [every N]
+    PLIANT_STATEMENT_RIGID_DAMPING,  // rigid-damping K
+    PLIANT_STATEMENT_STRAIN_LIMIT,   // strain-limit S
+    PLIANT_STATEMENT_GRAB,           // grab PARTICLES [NAME]
+    PLIANT_STATEMENT_LET,            // let NAME
+    PLIANT_STATEMENT_IMPULSE,        // impulse PARTICLES X Y Z
+    PLIANT_STATEMENT_OBSTACLE,       // SHAPE [friction MU] [as NAME]
+    PLIANT_STATEMENT_COLLIDE,        // collide none | self | bodies | all
+    PLIANT_STATEMENT_BONE,           // bone NAME X Y Z
+    PLIANT_STATEMENT_BIND,           // bind NAME PARTICLES
+    PLIANT_STATEMENT_TURN,           // turn NAME AX AY AZ DEGREES [over COUNT]
 } pliant_statement_kind;
+
+// What a statement is about.
+typedef enum pliant_statement_family {
+    PLIANT_FAMILY_COMMON,   // both
+    PLIANT_FAMILY_GREENS,   // the statics of Green's functions
+    PLIANT_FAMILY_LATTICE,  // the dynamics of lattices
+} pliant_statement_family;
 
 typedef enum pliant_vertex_kind {
     PLIANT_VERTEX_NONE,
@@ -54,13 +74,30 @@ typedef struct pliant_vertex_name {
     double position[3];
 } pliant_vertex_name;
 
-// SHAPE of a tool; what it fills of a statement: value, scalar, end.
+// SHAPE of a tool or an obstacle; what it fills of a statement: value, scalar, end.
 typedef enum pliant_shape_kind {
     PLIANT_SHAPE_NONE,
     PLIANT_SHAPE_SPHERE,   // sphere X Y Z R: centre, radius
     PLIANT_SHAPE_PLANE,    // plane NX NY NZ D: normal, not 0; the body's side is n.x >= D
     PLIANT_SHAPE_CAPSULE,  // capsule X Y Z X Y Z R: one end, the other (in `end`), radius
+    PLIANT_SHAPE_BOX,      // box X Y Z X Y Z: least corner, greatest (in `end`); obstacles only
 } pliant_shape_kind;
+
+// What collides with what, of lattices; numbers may be added.
+typedef enum pliant_collide {
+    PLIANT_COLLIDE_NONE = 0,
+    PLIANT_COLLIDE_SELF = 1,    // a body with itself
+    PLIANT_COLLIDE_BODIES = 2,  // bodies with each other
+} pliant_collide;
+
+// How the copies of `instances` are laid out: copy k stands at value + (k % columns, k / columns %
+// rows, k / (columns rows)) times `end`, component by component.
+typedef struct pliant_copies {
+    int64_t columns, rows;  // 0: not stated
+    int64_t seed;           // of a random turn of each; -1: not stated
+    double velocity[3];     // of each at the start
+    int32_t has_step;       // 1: `end` was stated
+} pliant_copies;
 
 typedef struct pliant_statement {
     pliant_statement_kind kind;
@@ -69,12 +106,23 @@ typedef struct pliant_statement {
     char name[PLIANT_SCRIPT_NAME_LIMIT];
     pliant_vertex_name vertex;
     double value[3];  // finite
-    double scalar;    // tolerance, seconds of dt, R or D of a shape; finite
-    int64_t count;    // of step; version of pliant-script; microseconds, -1: none
+    // Tolerance, seconds of dt, R or D of a shape, radius of PARTICLES (0: not stated), K of
+    // damping, S of strain-limit, degrees of turn; finite.
+    double scalar;
+    // Of step and instances; version of pliant-script; microseconds, -1: none; every N steps of
+    // damping; steps of a move or turn, 0: at once; pliant_collide.
+    int64_t count;
     pliant_shape_kind shape;
     double end[3];
     double friction, stiffness;  // 0: not stated
+    int32_t has_instance;        // of probe and PARTICLES
+    int64_t instance;            // from 0; 0 unless has_instance
+    pliant_copies copies;        // of instances
 } pliant_statement;
+
+pliant_statement_family pliant_statement_family_of(pliant_statement_kind kind);
+// The keyword that begins such a statement; that of an obstacle is its shape's. Static.
+const char *pliant_statement_keyword(pliant_statement_kind kind, pliant_shape_kind shape);
 
 typedef struct pliant_script pliant_script;  // an open script: a stream, its name and line number
 
