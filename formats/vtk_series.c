@@ -15,12 +15,16 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define INDEX_NAME  "pliant.pvd"
-#define WORK_NAME   "pliant.tmp"
-#define STEP_FORMAT "pliant_%08lld.vtp"
-#define STEP_PREFIX "pliant_"
+#define STEP_FORMAT "%s_%08lld.vtp"
 
-enum { NAME_LIMIT = 32, TEXT_LIMIT = 1024 };  // bytes of a step's file name; of a file's fixed text
+enum { NAME_LIMIT = 48, TEXT_LIMIT = 1024 };  // bytes of a step's file name; of a file's fixed text
+
+// What the names of a series begin with: index NAME.pvd, steps STEP_FORMAT, work folder NAME.tmp.
+static const char *const names[PLIANT_VTK_CONTENT_COUNT] = {
+    [PLIANT_VTK_SURFACE] = "pliant",
+    [PLIANT_VTK_PARTICLES] = "pliant_particles",
+    [PLIANT_VTK_OBSTACLES] = "pliant_obstacles",
+};
 
 static const char byte_order[] =
 #if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
@@ -34,8 +38,10 @@ struct pliant_vtk_series {
     char *path, *target;  // room for a path in work and one in folder
     size_t path_size;
     int made_folder;  // 1: the folder was not there before
+    pliant_vtk_content content;
     int32_t vertex_count, face_count;
     const double *positions;  // borrowed
+    const int32_t *instance;  // borrowed; NULL: not written
     int64_t step_count;
     FILE *index;  // DIR/pliant.tmp/pliant.pvd
     char *polys;  // the cells as XML, the same in every step
@@ -94,17 +100,22 @@ static char *put_array(char *text, const char *opening, const void *data, size_t
 
 // ---- Folders ----
 
-static int is_step_name(const char *name)
+static int is_name_of(const char *name, pliant_vtk_content content)
 {
-    if (strncmp(name, STEP_PREFIX, strlen(STEP_PREFIX)) != 0) return 0;
-    const char *digit = name + strlen(STEP_PREFIX);
+    const size_t length = strlen(names[content]);
+    if (strncmp(name, names[content], length) != 0) return 0;
+    if (strcmp(name + length, ".pvd") == 0) return 1;
+    if (name[length] != '_') return 0;
+    const char *digit = name + length + 1;
     const size_t count = strspn(digit, "0123456789");
     return count >= 8 && strcmp(digit + count, ".vtp") == 0;
 }
 
 static int is_own_name(const char *name)
 {
-    return is_step_name(name) || strcmp(name, INDEX_NAME) == 0;
+    for (int c = 0; c < PLIANT_VTK_CONTENT_COUNT; c++)
+        if (is_name_of(name, (pliant_vtk_content)c)) return 1;
+    return 0;
 }
 
 static int is_vtk_name(const char *name)
@@ -133,15 +144,22 @@ static pliant_status look_for_foreign(const char *folder, pliant_error *err)
     return status;
 }
 
-// Remove our files of a folder; the rest stays. The work folder is not a file.
-static void remove_own(const char *folder)
+// Remove a series' files of a folder, a surface's with all that is ours; the rest stays. The work
+// folders are not files.
+static void remove_own(const char *folder, pliant_vtk_content content)
 {
-    DIR *listing = opendir(folder);
-    if (!listing) return;
-    (void)unlinkat(dirfd(listing), INDEX_NAME, 0);  // before what it lists
-    for (struct dirent *entry; (entry = readdir(listing));)
-        if (is_own_name(entry->d_name)) (void)unlinkat(dirfd(listing), entry->d_name, 0);
-    closedir(listing);
+    for (int c = 0; c < PLIANT_VTK_CONTENT_COUNT; c++) {
+        DIR *listing = opendir(folder);
+        if (!listing) return;
+        char index[NAME_LIMIT];
+        snprintf(index, sizeof index, "%s.pvd", names[c]);
+        const int is_meant = c == (int)content || content == PLIANT_VTK_SURFACE;
+        if (is_meant) (void)unlinkat(dirfd(listing), index, 0);  // before what it lists
+        for (struct dirent *entry; is_meant && (entry = readdir(listing));)
+            if (is_name_of(entry->d_name, (pliant_vtk_content)c))
+                (void)unlinkat(dirfd(listing), entry->d_name, 0);
+        closedir(listing);
+    }
 }
 
 // ---- Life ----
@@ -162,56 +180,89 @@ static void destroy(pliant_vtk_series *series)
 void pliant_vtk_series_abandon(pliant_vtk_series *series)
 {
     if (!series) return;
-    remove_own(series->work);
+    remove_own(series->work, series->content);
     (void)rmdir(series->work);
     if (series->made_folder) (void)rmdir(series->folder);
     destroy(series);
 }
 
-static pliant_status allocate(pliant_vtk_series *series, const pliant_vtk_series_def *def,
-                              pliant_error *err)
+static pliant_status name_paths(pliant_vtk_series *series, const char *folder, pliant_error *err)
 {
-    const size_t n = (size_t)def->vertex_count, faces = (size_t)def->face_count;
-    const size_t folder_size = strlen(def->folder) + 1;
-    series->path_size = folder_size + sizeof WORK_NAME + NAME_LIMIT + 2;
+    const size_t folder_size = strlen(folder) + 1;
+    series->path_size = folder_size + 2 * NAME_LIMIT + 2;
     series->folder = malloc(folder_size);
     series->work = malloc(series->path_size);
     series->path = malloc(series->path_size);
     series->target = malloc(series->path_size);
-    series->polys = malloc(base64_size(8 + 12 * faces) + base64_size(8 + 4 * faces) + TEXT_LIMIT);
-    series->values = malloc(12 * n + 1);
-    // Four vector fields, the cells and the text around them.
-    series->text_capacity = 4 * base64_size(8 + 12 * n) + base64_size(8 + 12 * faces) +
-                            base64_size(8 + 4 * faces) + (size_t)4 * TEXT_LIMIT;
-    series->text = malloc(series->text_capacity);
-    if (!series->folder || !series->work || !series->path || !series->target || !series->polys ||
-        !series->values || !series->text)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %d vertices",
-                                def->folder, (int)def->vertex_count);
-    memcpy(series->folder, def->folder, folder_size);
-    snprintf(series->work, series->path_size, "%s/" WORK_NAME, def->folder);
+    if (!series->folder || !series->work || !series->path || !series->target)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory", folder);
+    memcpy(series->folder, folder, folder_size);
+    snprintf(series->work, series->path_size, "%s/%s.tmp", folder, names[series->content]);
     return PLIANT_OK;
 }
 
-// The cells: triangles, and where each ends.
-static pliant_status encode_faces(pliant_vtk_series *series, const pliant_vtk_series_def *def,
+static pliant_status allocate(pliant_vtk_series *series, const pliant_vtk_mesh *mesh,
+                              pliant_error *err)
+{
+    const size_t n = (size_t)mesh->vertex_count, faces = (size_t)mesh->face_count;
+    const size_t cells = faces > 0 ? base64_size(8 + 12 * faces) + base64_size(8 + 4 * faces)
+                                   : 2 * base64_size(8 + 4 * n);
+    free(series->polys);
+    free(series->values);
+    free(series->text);
+    series->polys = malloc(cells + TEXT_LIMIT);
+    series->values = malloc(12 * n + 1);
+    // Four vector fields, the instances, the cells and the text around them.
+    series->text_capacity =
+        4 * base64_size(8 + 12 * n) + base64_size(8 + 4 * n) + cells + (size_t)4 * TEXT_LIMIT;
+    series->text = malloc(series->text_capacity);
+    if (!series->polys || !series->values || !series->text)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %d vertices",
+                                series->folder, (int)mesh->vertex_count);
+    return PLIANT_OK;
+}
+
+// The cells: triangles, or without any the points; and where each ends.
+static pliant_status encode_cells(pliant_vtk_series *series, const pliant_vtk_mesh *mesh,
                                   pliant_error *err)
 {
-    const size_t faces = (size_t)def->face_count;
-    int32_t *ends = malloc(4 * faces + 1);
-    if (!ends)
-        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %d faces", def->folder,
-                                (int)def->face_count);
-    for (size_t f = 0; f < faces; f++) ends[f] = (int32_t)(3 * (f + 1));
-    char *text = put(series->polys, "<Polys>\n");
+    const size_t corners = mesh->face_count > 0 ? 3 : 1;
+    const size_t count = (size_t)(mesh->face_count > 0 ? mesh->face_count : mesh->vertex_count);
+    int32_t *ends = malloc(4 * count + 1), *points = malloc(4 * count + 1);
+    if (!ends || !points) {
+        free(ends);
+        free(points);
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %zu cells",
+                                series->folder, count);
+    }
+    for (size_t i = 0; i < count; i++) {
+        ends[i] = (int32_t)(corners * (i + 1));
+        points[i] = (int32_t)i;
+    }
+    char *text = put(series->polys, corners == 3 ? "<Polys>\n" : "<Verts>\n");
     text = put_array(text, "<DataArray type=\"Int32\" Name=\"connectivity\" format=\"binary\">",
-                     def->faces, 3 * faces);
+                     corners == 3 ? mesh->faces : points, corners * count);
     text = put_array(text, "<DataArray type=\"Int32\" Name=\"offsets\" format=\"binary\">", ends,
-                     faces);
-    text = put(text, "</Polys>\n");
+                     count);
+    text = put(text, corners == 3 ? "</Polys>\n" : "</Verts>\n");
     series->polys_size = (size_t)(text - series->polys);
+    free(points);
     free(ends);
     return PLIANT_OK;
+}
+
+pliant_status pliant_vtk_series_remesh(pliant_vtk_series *series, const pliant_vtk_mesh *mesh,
+                                       pliant_error *err)
+{
+    if (mesh->vertex_count < 0 || mesh->face_count < 0)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: %d vertices and %d faces",
+                                series->folder, (int)mesh->vertex_count, (int)mesh->face_count);
+    series->vertex_count = mesh->vertex_count;
+    series->face_count = mesh->face_count;
+    series->positions = mesh->positions;
+    series->instance = mesh->instance;
+    const pliant_status status = allocate(series, mesh, err);
+    return status < 0 ? status : encode_cells(series, mesh, err);
 }
 
 static pliant_status open_folder(pliant_vtk_series *series, const pliant_vtk_series_def *def,
@@ -228,9 +279,9 @@ static pliant_status open_folder(pliant_vtk_series *series, const pliant_vtk_ser
     if (mkdir(series->work, 0777) != 0) {
         if (errno != EEXIST)
             return pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", series->work, strerror(errno));
-        remove_own(series->work);
+        remove_own(series->work, series->content);
     }
-    snprintf(series->path, series->path_size, "%s/" INDEX_NAME, series->work);
+    snprintf(series->path, series->path_size, "%s/%s.pvd", series->work, names[series->content]);
     series->index = fopen(series->path, "w");
     if (!series->index)
         return pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", series->path, strerror(errno));
@@ -244,16 +295,11 @@ static pliant_status open_folder(pliant_vtk_series *series, const pliant_vtk_ser
 pliant_status pliant_vtk_series_create(const pliant_vtk_series_def *def, pliant_vtk_series **series,
                                        pliant_error *err)
 {
-    if (def->vertex_count < 0 || def->face_count < 0)
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: %d vertices and %d faces",
-                                def->folder, (int)def->vertex_count, (int)def->face_count);
     pliant_vtk_series *s = calloc(1, sizeof *s);
     if (!s) return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory", def->folder);
-    s->vertex_count = def->vertex_count;
-    s->face_count = def->face_count;
-    s->positions = def->positions;
-    pliant_status status = allocate(s, def, err);
-    if (status >= 0) status = encode_faces(s, def, err);
+    s->content = def->content;
+    pliant_status status = name_paths(s, def->folder, err);
+    if (status >= 0) status = pliant_vtk_series_remesh(s, &def->mesh, err);
     if (status < 0) {
         destroy(s);
         return status;
@@ -294,9 +340,9 @@ static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement
     text += sprintf(text,
                     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
                     "byte_order=\"%s\" header_type=\"UInt64\">\n<PolyData>\n<Piece "
-                    "NumberOfPoints=\"%zu\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
+                    "NumberOfPoints=\"%zu\" NumberOfVerts=\"%zu\" NumberOfLines=\"0\" "
                     "NumberOfStrips=\"0\" NumberOfPolys=\"%zu\">\n",
-                    byte_order, n, (size_t)series->face_count);
+                    byte_order, n, series->face_count > 0 ? 0 : n, (size_t)series->face_count);
     text = put(text, normals ? "<PointData Vectors=\"displacement\" Normals=\"normal\">\n"
                              : "<PointData Vectors=\"displacement\">\n");
     load(values, displacement, n);
@@ -304,11 +350,13 @@ static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement
                      "<DataArray type=\"Float32\" Name=\"displacement\" "
                      "NumberOfComponents=\"3\" format=\"binary\">",
                      values, 3 * n);
-    load(values, traction, n);
-    text = put_array(text,
-                     "<DataArray type=\"Float32\" Name=\"traction\" "
-                     "NumberOfComponents=\"3\" format=\"binary\">",
-                     values, 3 * n);
+    if (traction) {
+        load(values, traction, n);
+        text = put_array(text,
+                         "<DataArray type=\"Float32\" Name=\"traction\" "
+                         "NumberOfComponents=\"3\" format=\"binary\">",
+                         values, 3 * n);
+    }
     if (normals) {
         load(values, normals, n);
         text = put_array(text,
@@ -316,6 +364,9 @@ static size_t compose(pliant_vtk_series *series, const pliant_vec3 *displacement
                          "NumberOfComponents=\"3\" format=\"binary\">",
                          values, 3 * n);
     }
+    if (series->instance)
+        text = put_array(text, "<DataArray type=\"Int32\" Name=\"instance\" format=\"binary\">",
+                         series->instance, n);
     text = put(text, "</PointData>\n<Points>\n");
     load(values, displacement, n);
     for (size_t i = 0; i < 3 * n; i++) values[i] = (float)(series->positions[i] + values[i]);
@@ -349,9 +400,10 @@ static pliant_status write_file(const char *path, const char *text, size_t size,
     return PLIANT_OK;
 }
 
-static void name_step(char *path, size_t size, const char *folder, int64_t number)
+static void name_step(char *path, size_t size, const pliant_vtk_series *series, const char *folder,
+                      int64_t number)
 {
-    snprintf(path, size, "%s/" STEP_FORMAT, folder, (long long)number);
+    snprintf(path, size, "%s/" STEP_FORMAT, folder, names[series->content], (long long)number);
 }
 
 pliant_status pliant_vtk_series_add(pliant_vtk_series *series, double time,
@@ -359,16 +411,16 @@ pliant_status pliant_vtk_series_add(pliant_vtk_series *series, double time,
                                     const pliant_vec3 *normals, pliant_error *err)
 {
     const int64_t number = series->step_count + 1;
-    name_step(series->path, series->path_size, series->work, number);
-    const pliant_status status =
-        write_file(series->path, series->text, compose(series, displacement, traction, normals), err);
+    name_step(series->path, series->path_size, series, series->work, number);
+    const pliant_status status = write_file(series->path, series->text,
+                                            compose(series, displacement, traction, normals), err);
     if (status < 0) return status;
     series->step_count = number;
     fprintf(series->index, "<DataSet timestep=\"%.12g\" part=\"0\" file=\"" STEP_FORMAT "\"/>\n",
-            time, (long long)number);
+            time, names[series->content], (long long)number);
     if (ferror(series->index))
-        return pliant_error_set(err, PLIANT_ERR_IO, "%s/" INDEX_NAME ": %s", series->work,
-                                strerror(errno));
+        return pliant_error_set(err, PLIANT_ERR_IO, "%s/%s.pvd: %s", series->work,
+                                names[series->content], strerror(errno));
     return PLIANT_OK;
 }
 
@@ -378,28 +430,30 @@ pliant_status pliant_vtk_series_commit(pliant_vtk_series *series, pliant_error *
     const int failed = ferror(series->index) | fclose(series->index);
     series->index = NULL;
     if (failed) {
-        pliant_error_set(err, PLIANT_ERR_IO, "%s/" INDEX_NAME ": %s", series->work,
+        pliant_error_set(err, PLIANT_ERR_IO, "%s/%s.pvd: %s", series->work, names[series->content],
                          strerror(errno));
         pliant_vtk_series_abandon(series);
         return PLIANT_ERR_IO;
     }
     // The index goes first and comes last: it never lists files that are not there.
-    remove_own(series->folder);
+    remove_own(series->folder, series->content);
     pliant_status status = PLIANT_OK;
     for (int64_t i = 1; status >= 0 && i <= series->step_count + 1; i++) {
         if (i <= series->step_count) {
-            name_step(series->path, series->path_size, series->work, i);
-            name_step(series->target, series->path_size, series->folder, i);
+            name_step(series->path, series->path_size, series, series->work, i);
+            name_step(series->target, series->path_size, series, series->folder, i);
         } else {
-            snprintf(series->path, series->path_size, "%s/" INDEX_NAME, series->work);
-            snprintf(series->target, series->path_size, "%s/" INDEX_NAME, series->folder);
+            snprintf(series->path, series->path_size, "%s/%s.pvd", series->work,
+                     names[series->content]);
+            snprintf(series->target, series->path_size, "%s/%s.pvd", series->folder,
+                     names[series->content]);
         }
         if (rename(series->path, series->target) != 0)
             status =
                 pliant_error_set(err, PLIANT_ERR_IO, "%s: %s", series->target, strerror(errno));
     }
     if (status < 0) {
-        remove_own(series->folder);
+        remove_own(series->folder, series->content);
         pliant_vtk_series_abandon(series);
         return status;
     }

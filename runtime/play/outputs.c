@@ -55,17 +55,16 @@ static pliant_status open_vtk(pliant_outputs *o, pliant_error *err)
     pliant_vtk_series_def def = {
         .folder = o->options->vtk,
         .overwrite = o->options->force ? PLIANT_VTK_FOREIGN : PLIANT_VTK_OWN,
-        .vertex_count = count,
-        .face_count = pliant_model_level_face_count(o->model, o->level),
-        .positions = pliant_model_positions(o->model),
-        .faces = pliant_model_faces(o->model, o->level),
+        .mesh = {.vertex_count = count,
+                 .face_count = pliant_model_level_face_count(o->model, o->level),
+                 .positions = pliant_model_positions(o->model),
+                 .faces = pliant_model_faces(o->model, o->level)},
     };
-    if (o->skin) {
-        def.vertex_count = o->skin->vertex_count;
-        def.face_count = o->skin->face_count;
-        def.positions = o->skin->rest;
-        def.faces = o->skin->faces;
-    }
+    if (o->skin)
+        def.mesh = (pliant_vtk_mesh){.vertex_count = o->skin->vertex_count,
+                                     .face_count = o->skin->face_count,
+                                     .positions = o->skin->rest,
+                                     .faces = o->skin->faces};
     return pliant_vtk_series_create(&def, &o->vtk, err);
 }
 

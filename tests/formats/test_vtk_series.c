@@ -81,10 +81,10 @@ static pliant_vtk_series_def def_in(const char *folder)
 {
     return (pliant_vtk_series_def){
         .folder = folder,
-        .vertex_count = VERTEX_COUNT,
-        .face_count = FACE_COUNT,
-        .positions = &positions[0][0],
-        .faces = &faces[0][0],
+        .mesh = {.vertex_count = VERTEX_COUNT,
+                 .face_count = FACE_COUNT,
+                 .positions = &positions[0][0],
+                 .faces = &faces[0][0]},
     };
 }
 
@@ -283,6 +283,78 @@ static void an_abandoned_series_leaves_the_earlier_one_whole(void **state)
     remove_folder(folder);
 }
 
+static void several_series_of_ours_share_a_folder(void **state)
+{
+    (void)state;
+    static const int32_t instance[VERTEX_COUNT] = {0, 0, 1, 1};
+    char folder[64];
+    pliant_error err;
+    pliant_vtk_series *series[PLIANT_VTK_CONTENT_COUNT];
+    make_folder(folder);
+    const pliant_vec3 u[VERTEX_COUNT] = {{0, 0, 0}};
+    for (int pass = 0; pass < 2; pass++) {
+        for (int c = 0; c < PLIANT_VTK_CONTENT_COUNT; c++) {
+            pliant_vtk_series_def def = def_in(folder);
+            def.content = (pliant_vtk_content)c;
+            def.mesh.instance = instance;
+            if (c == PLIANT_VTK_PARTICLES) def.mesh.face_count = 0;
+            check_ok(pliant_vtk_series_create(&def, &series[c], &err), &err);
+            for (int step = 0; step < 2 - pass; step++)
+                check_ok(pliant_vtk_series_add(series[c], step, u, NULL, NULL, &err), &err);
+        }
+        for (int c = 0; c < PLIANT_VTK_CONTENT_COUNT; c++)
+            check_ok(pliant_vtk_series_commit(series[c], &err), &err);
+        // The second pass leaves nothing of the longer first.
+        assert_int_equal(exists(folder, "pliant_particles_00000002.vtp"), pass == 0);
+        assert_int_equal(exists(folder, "pliant_obstacles_00000002.vtp"), pass == 0);
+    }
+    assert_true(exists(folder, "pliant.pvd"));
+    assert_true(exists(folder, "pliant_particles.pvd"));
+    assert_true(exists(folder, "pliant_obstacles_00000001.vtp"));
+    assert_false(exists(folder, "pliant_particles.tmp"));
+    char *text = read_all(folder, "pliant_particles_00000001.vtp");
+    check_xml(text);
+    assert_non_null(strstr(text, "NumberOfVerts=\"4\""));
+    assert_non_null(strstr(text, "NumberOfPolys=\"0\""));
+    assert_non_null(strstr(text, "Name=\"instance\""));
+    assert_null(strstr(text, "traction"));
+    free(text);
+    // A surface alone leaves none of the others to be mistaken for its own.
+    write_series(folder, 1);
+    assert_false(exists(folder, "pliant_particles.pvd"));
+    assert_false(exists(folder, "pliant_obstacles_00000001.vtp"));
+    remove_folder(folder);
+}
+
+static void the_mesh_may_change_between_steps(void **state)
+{
+    (void)state;
+    static const double two[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 5, 5}, {6, 5, 5}, {5, 6, 5}};
+    static const int32_t two_faces[2][3] = {{0, 1, 2}, {3, 4, 5}};
+    char folder[64];
+    pliant_error err;
+    pliant_vtk_series *series;
+    make_folder(folder);
+    const pliant_vtk_series_def def = def_in(folder);
+    const pliant_vec3 u[6] = {{0, 0, 0}};
+    const pliant_vtk_mesh mesh = {
+        .vertex_count = 6, .face_count = 2, .positions = &two[0][0], .faces = &two_faces[0][0]};
+    check_ok(pliant_vtk_series_create(&def, &series, &err), &err);
+    check_ok(pliant_vtk_series_add(series, 0, u, NULL, NULL, &err), &err);
+    check_ok(pliant_vtk_series_remesh(series, &mesh, &err), &err);
+    check_ok(pliant_vtk_series_add(series, 1, u, NULL, NULL, &err), &err);
+    check_ok(pliant_vtk_series_commit(series, &err), &err);
+    char *text = read_all(folder, "pliant_00000001.vtp");
+    assert_non_null(strstr(text, "NumberOfPoints=\"4\""));
+    free(text);
+    text = read_all(folder, "pliant_00000002.vtp");
+    check_xml(text);
+    assert_non_null(strstr(text, "NumberOfPoints=\"6\""));
+    assert_non_null(strstr(text, "NumberOfPolys=\"2\""));
+    free(text);
+    remove_folder(folder);
+}
+
 static void another_series_is_refused_unless_forced(void **state)
 {
     (void)state;
@@ -358,6 +430,8 @@ int main(void)
         cmocka_unit_test(the_index_lists_every_step_with_its_time),
         cmocka_unit_test(a_shorter_series_leaves_nothing_of_a_longer_one),
         cmocka_unit_test(an_abandoned_series_leaves_the_earlier_one_whole),
+        cmocka_unit_test(several_series_of_ours_share_a_folder),
+        cmocka_unit_test(the_mesh_may_change_between_steps),
         cmocka_unit_test(another_series_is_refused_unless_forced),
         cmocka_unit_test(a_folder_that_cannot_be_is_refused),
         cmocka_unit_test(a_full_disk_is_told_and_leaves_nothing),
