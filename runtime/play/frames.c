@@ -15,10 +15,17 @@ pliant_status pliant_frames_open(const char *path, int32_t vertex_count, pliant_
                             path);
 }
 
-pliant_status pliant_frames_add(pliant_frames *frames, const pliant_vec3 *displacement,
-                                const pliant_step *step, pliant_error *err)
+pliant_status pliant_frames_widen(pliant_frames *frames, int32_t vertex_count, pliant_error *err)
 {
-    (void)frames, (void)displacement, (void)step;
+    (void)frames, (void)vertex_count;
+    return pliant_error_set(err, PLIANT_ERR_MISSING, "built without HDF5");
+}
+
+pliant_status pliant_frames_add(pliant_frames *frames, const pliant_vec3 *displacement,
+                                const pliant_vec3 *normals, const pliant_step *step,
+                                pliant_error *err)
+{
+    (void)frames, (void)displacement, (void)normals, (void)step;
     return pliant_error_set(err, PLIANT_ERR_MISSING, "built without HDF5");
 }
 
@@ -57,7 +64,9 @@ struct pliant_frames {
     int spool;  // file descriptor, unlinked
     uint64_t step_count;
     uint64_t vertex_count;
-    size_t record_size;  // bytes of one step in the spool
+    int has_normals;
+    size_t field_size;   // bytes of a step's displacements, or normals
+    size_t record_size;  // bytes of one step in the spool: head, displacements, normals
     char *record;
 };
 
@@ -92,20 +101,35 @@ static pliant_status open_spool(const char *path, int *spool, pliant_error *err)
     return PLIANT_OK;
 }
 
+static pliant_status lay_out(pliant_frames *frames, int32_t vertex_count, pliant_error *err)
+{
+    frames->vertex_count = (uint64_t)vertex_count;
+    frames->field_size = (size_t)vertex_count * sizeof(pliant_vec3);
+    frames->record_size = sizeof(step_head) + (frames->has_normals ? 2 : 1) * frames->field_size;
+    free(frames->record);
+    frames->record = malloc(frames->record_size);
+    if (!frames->record)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %d vertices",
+                                frames->path, (int)vertex_count);
+    return PLIANT_OK;
+}
+
+pliant_status pliant_frames_widen(pliant_frames *frames, int32_t vertex_count, pliant_error *err)
+{
+    frames->has_normals = 1;
+    return lay_out(frames, vertex_count, err);
+}
+
 pliant_status pliant_frames_open(const char *path, int32_t vertex_count, pliant_frames **frames,
                                  pliant_error *err)
 {
     pliant_frames *f = calloc(1, sizeof *f);
     if (!f) return pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory", path);
     f->spool = -1;
-    f->vertex_count = (uint64_t)vertex_count;
-    f->record_size = sizeof(step_head) + (size_t)vertex_count * sizeof(pliant_vec3);
     f->path = strdup(path);
-    f->record = malloc(f->record_size);
     pliant_status status = PLIANT_OK;
-    if (!f->path || !f->record)
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for %d vertices", path,
-                                  (int)vertex_count);
+    if (!f->path) status = pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory", path);
+    if (status >= 0) status = lay_out(f, vertex_count, err);
     if (status >= 0) status = open_spool(path, &f->spool, err);
     if (status < 0) {
         destroy(f);
@@ -116,11 +140,14 @@ pliant_status pliant_frames_open(const char *path, int32_t vertex_count, pliant_
 }
 
 pliant_status pliant_frames_add(pliant_frames *frames, const pliant_vec3 *displacement,
-                                const pliant_step *step, pliant_error *err)
+                                const pliant_vec3 *normals, const pliant_step *step,
+                                pliant_error *err)
 {
     const step_head head = {(uint64_t)step->number, step->time, (double)step->total_ns * 1e-3};
     memcpy(frames->record, &head, sizeof head);
-    memcpy(frames->record + sizeof head, displacement, frames->record_size - sizeof head);
+    memcpy(frames->record + sizeof head, displacement, frames->field_size);
+    if (frames->has_normals)
+        memcpy(frames->record + sizeof head + frames->field_size, normals, frames->field_size);
     for (size_t done = 0; done < frames->record_size;) {
         const ssize_t written =
             write(frames->spool, frames->record + done, frames->record_size - done);
@@ -154,7 +181,7 @@ typedef struct batch {
     uint64_t capacity;
     uint64_t *number;
     double *time, *solve_us;
-    char *displacement;
+    char *displacement, *normal;  // normal: NULL without
 } batch;
 
 static pliant_status write_batch(pliant_writer *writer, const pliant_frames *frames, const batch *b,
@@ -164,6 +191,8 @@ static pliant_status write_batch(pliant_writer *writer, const pliant_frames *fra
     const uint64_t extent[3] = {count, frames->vertex_count, 3};
     pliant_status status =
         pliant_writer_write(writer, "/displacement", start, extent, b->displacement, err);
+    if (status >= 0 && b->normal)
+        status = pliant_writer_write(writer, "/normal", start, extent, b->normal, err);
     if (status >= 0) status = pliant_writer_write(writer, "/step", start, extent, b->number, err);
     if (status >= 0) status = pliant_writer_write(writer, "/time", start, extent, b->time, err);
     if (status >= 0)
@@ -173,14 +202,16 @@ static pliant_status write_batch(pliant_writer *writer, const pliant_frames *fra
 
 static pliant_status copy_spool(pliant_frames *frames, pliant_writer *writer, pliant_error *err)
 {
-    const size_t surface_size = frames->record_size - sizeof(step_head);
+    const size_t field_size = frames->field_size;
     batch b = {.capacity = 1 + BATCH_BYTES / frames->record_size};
     b.number = malloc(b.capacity * sizeof *b.number);
     b.time = malloc(b.capacity * sizeof *b.time);
     b.solve_us = malloc(b.capacity * sizeof *b.solve_us);
-    b.displacement = malloc(b.capacity * surface_size + 1);
+    b.displacement = malloc(b.capacity * field_size + 1);
+    if (frames->has_normals) b.normal = malloc(b.capacity * field_size + 1);
     pliant_status status = PLIANT_OK;
-    if (!b.number || !b.time || !b.solve_us || !b.displacement)
+    if (!b.number || !b.time || !b.solve_us || !b.displacement ||
+        (frames->has_normals && !b.normal))
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "%s: no memory for a batch of %llu steps",
                                   frames->path, (unsigned long long)b.capacity);
     for (uint64_t first = 0; status >= 0 && first < frames->step_count; first += b.capacity) {
@@ -194,10 +225,14 @@ static pliant_status copy_spool(pliant_frames *frames, pliant_writer *writer, pl
             b.number[i] = head.number;
             b.time[i] = head.time;
             b.solve_us[i] = head.solve_us;
-            memcpy(b.displacement + i * surface_size, frames->record + sizeof head, surface_size);
+            memcpy(b.displacement + i * field_size, frames->record + sizeof head, field_size);
+            if (b.normal)
+                memcpy(b.normal + i * field_size, frames->record + sizeof head + field_size,
+                       field_size);
         }
         if (status >= 0) status = write_batch(writer, frames, &b, first, count, err);
     }
+    free(b.normal);
     free(b.displacement);
     free(b.solve_us);
     free(b.time);
@@ -216,10 +251,15 @@ pliant_status pliant_frames_commit(pliant_frames *frames, pliant_error *err)
         {.path = "/step", .type = PLIANT_U8, .rank = 1, .shape = {steps, 1, 1}},
         {.path = "/time", .type = PLIANT_F8, .rank = 1, .shape = {steps, 1, 1}},
         {.path = "/solve_us", .type = PLIANT_F8, .rank = 1, .shape = {steps, 1, 1}},
+        {.path = "/normal",
+         .type = PLIANT_F4,
+         .rank = 3,
+         .shape = {steps, frames->vertex_count, 3}},
     };
+    const int32_t section_count = frames->has_normals ? 5 : 4;
     pliant_writer *writer = NULL;
-    pliant_status status = pliant_writer_create(
-        frames->path, sections, (int32_t)(sizeof sections / sizeof *sections), &writer, err);
+    pliant_status status =
+        pliant_writer_create(frames->path, sections, section_count, &writer, err);
     if (status >= 0) {
         status = copy_spool(frames, writer, err);
         if (status >= 0) status = pliant_writer_commit(writer, err);

@@ -175,7 +175,8 @@ static pliant_status stepped(void *context, pliant_player *player, const pliant_
     const pliant_vec3 *surface = pliant_player_surface(player);
     if (o->skin) pliant_skin_move(o->skin, surface);
     if (status >= 0 && o->frames)
-        status = pliant_frames_add(o->frames, o->skin ? o->skin->displacement : surface, step, err);
+        status = pliant_frames_add(o->frames, o->skin ? o->skin->displacement : surface, NULL, step,
+                                   err);
     if (status >= 0 && o->vtk) status = add_vtk(o, player, step, err);
     if (status >= 0 && o->compare) status = pliant_compare_add(o->compare, player, err);
     if (status < 0 || !o->is_streaming) return status;

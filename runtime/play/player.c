@@ -313,6 +313,12 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
         .deadline_ns = given,
         .status = solved,
         .total_ns = end - start,
+        .kind = PLIANT_PLAY_GREENS,
+        .phase_ns = {[PLIANT_PHASE_CAPACITANCE] = report.capacitance_ns,
+                     [PLIANT_PHASE_CONTACT] = report.contact_ns,
+                     [PLIANT_PHASE_SUMMATION] = report.summation_ns,
+                     [PLIANT_PHASE_SURFACE] = report.surface_ns,
+                     [PLIANT_PHASE_TOTAL] = end - start},
         .report = report,
         .force = {force.x + props.force.x, force.y + props.force.y, force.z + props.force.z},
     };

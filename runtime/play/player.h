@@ -8,6 +8,7 @@
 #pragma once
 
 #include "conditions.h"
+#include "phases.h"
 #include "props.h"
 
 #include "pliant/pliant.h"
@@ -50,6 +51,8 @@ typedef struct pliant_step {
     int64_t deadline_ns;   // what the solve was given, or PLIANT_NEVER
     pliant_status status;  // of the solve: PLIANT_OK or a reduced result (the report tells more)
     int64_t total_ns;      // solve and surface together
+    pliant_play_kind kind;
+    int64_t phase_ns[PLIANT_PHASE_LIMIT];  // of that kind
     // Of the step's last solve of the solver; but level, is_late and lateness_ns are of all.
     pliant_solver_report report;
     pliant_vec3 force;  // total contact force, of patches, tools and proxies too, N

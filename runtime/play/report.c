@@ -6,9 +6,9 @@
 static void write_timings(const pliant_timings *timings, FILE *stream)
 {
     fprintf(stream, "%-14s %12s %12s %12s\n", "phase", "median us", "99% us", "worst us");
-    for (int p = 0; p < PLIANT_PHASE_COUNT; p++) {
+    for (int p = 0; p < pliant_phase_count(timings->kind); p++) {
         const pliant_histogram *h = &timings->phases[p];
-        fprintf(stream, "%-14s %12.1f %12.1f %12.1f\n", pliant_phase_name((pliant_phase)p),
+        fprintf(stream, "%-14s %12.1f %12.1f %12.1f\n", pliant_phase_name(timings->kind, p),
                 1e-3 * pliant_histogram_percentile(h, 0.5),
                 1e-3 * pliant_histogram_percentile(h, 0.99),
                 1e-3 * pliant_histogram_percentile(h, 1));
@@ -134,7 +134,8 @@ void pliant_report_write(const pliant_report *report, FILE *stream)
     fprintf(stream, "\n");
     write_timings(result->timings, stream);
     if (report->repeat > 1) {
-        const pliant_histogram *h = &result->warm_up->phases[PLIANT_PHASE_TOTAL];
+        const pliant_timings *first = result->warm_up;
+        const pliant_histogram *h = &first->phases[pliant_phase_count(first->kind) - 1];
         fprintf(stream, "%-14s %12.1f %12.1f %12.1f\n", "first passes",
                 1e-3 * pliant_histogram_percentile(h, 0.5),
                 1e-3 * pliant_histogram_percentile(h, 0.99),

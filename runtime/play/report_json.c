@@ -40,10 +40,10 @@ static void put_vec3(pliant_vec3 v, FILE *stream)
 static void put_phases(const pliant_timings *timings, FILE *stream)
 {
     fputc('{', stream);
-    for (int p = 0; p < PLIANT_PHASE_COUNT; p++) {
+    for (int p = 0; p < pliant_phase_count(timings->kind); p++) {
         const pliant_histogram *h = &timings->phases[p];
         fprintf(stream, "%s\"%s\":{\"median\":%.3f,\"p99\":%.3f,\"worst\":%.3f,\"mean\":%.3f}",
-                p ? "," : "", pliant_phase_name((pliant_phase)p),
+                p ? "," : "", pliant_phase_name(timings->kind, p),
                 1e-3 * pliant_histogram_percentile(h, 0.5),
                 1e-3 * pliant_histogram_percentile(h, 0.99),
                 1e-3 * pliant_histogram_percentile(h, 1),
@@ -176,15 +176,15 @@ void pliant_report_write_step_json(const pliant_player *player, const pliant_ste
     const pliant_solver_report *r = &step->report;
     fprintf(stream,
             "{\"step\":%lld,\"time\":%.12g,\"solve_us\":%.3f,\"constraints\":%d,\"level\":%d,"
-            "\"rough\":%s,\"late\":%s,\"lateness_us\":%.3f,\"us\":{\"capacitance\":%.3f,"
-            "\"contact\":%.3f,\"summation\":%.3f,"
-            "\"surface\":%.3f,\"total\":%.3f},\"probes\":{",
+            "\"rough\":%s,\"late\":%s,\"lateness_us\":%.3f,\"us\":{",
             (long long)step->number, step->time, 1e-3 * (double)step->total_ns,
             (int)r->constraint_count, (int)r->level,
             step->status == PLIANT_ROUGH ? "true" : "false", r->is_late ? "true" : "false",
-            1e-3 * (double)r->lateness_ns, 1e-3 * (double)r->capacitance_ns,
-            1e-3 * (double)r->contact_ns, 1e-3 * (double)r->summation_ns,
-            1e-3 * (double)r->surface_ns, 1e-3 * (double)step->total_ns);
+            1e-3 * (double)r->lateness_ns);
+    for (int p = 0; p < pliant_phase_count(step->kind); p++)
+        fprintf(stream, "%s\"%s\":%.3f", p ? "," : "", pliant_phase_name(step->kind, p),
+                1e-3 * (double)step->phase_ns[p]);
+    fputs("},\"probes\":{", stream);
     int32_t count;
     const pliant_probe *probes = pliant_player_probes(player, &count);
     for (int32_t i = 0; i < count; i++) {

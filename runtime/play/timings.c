@@ -1,19 +1,6 @@
 // timings.c: how long the phases of played steps took, and what was odd about them.
 #include "timings.h"
 
-static const char *const phase_names[PLIANT_PHASE_COUNT] = {
-    [PLIANT_PHASE_CAPACITANCE] = "capacitance",
-    [PLIANT_PHASE_CONTACT] = "contact",
-    [PLIANT_PHASE_SUMMATION] = "summation",
-    [PLIANT_PHASE_SURFACE] = "surface",
-    [PLIANT_PHASE_TOTAL] = "total",
-};
-
-const char *pliant_phase_name(pliant_phase phase)
-{
-    return phase_names[phase];
-}
-
 static void widen(pliant_punctuality *punctuality, int64_t least, int64_t most)
 {
     if (punctuality->given_count == 0 || least < punctuality->least_given)
@@ -58,11 +45,9 @@ void pliant_punctuality_merge(pliant_punctuality *punctuality, const pliant_punc
 void pliant_timings_add(pliant_timings *timings, const pliant_step *step)
 {
     const pliant_solver_report *report = &step->report;
-    pliant_histogram_add(&timings->phases[PLIANT_PHASE_CAPACITANCE], report->capacitance_ns);
-    pliant_histogram_add(&timings->phases[PLIANT_PHASE_CONTACT], report->contact_ns);
-    pliant_histogram_add(&timings->phases[PLIANT_PHASE_SUMMATION], report->summation_ns);
-    pliant_histogram_add(&timings->phases[PLIANT_PHASE_SURFACE], report->surface_ns);
-    pliant_histogram_add(&timings->phases[PLIANT_PHASE_TOTAL], step->total_ns);
+    timings->kind = step->kind;
+    for (int p = 0; p < pliant_phase_count(step->kind); p++)
+        pliant_histogram_add(&timings->phases[p], step->phase_ns[p]);
     add_punctuality(&timings->punctuality, step);
     if (step->status == PLIANT_ROUGH) timings->rough_count++;
     if (report->constraint_count > timings->most_constraints)
@@ -71,7 +56,8 @@ void pliant_timings_add(pliant_timings *timings, const pliant_step *step)
 
 void pliant_timings_merge(pliant_timings *timings, const pliant_timings *other)
 {
-    for (int p = 0; p < PLIANT_PHASE_COUNT; p++)
+    if (other->phases[0].count > 0) timings->kind = other->kind;
+    for (int p = 0; p < PLIANT_PHASE_LIMIT; p++)
         pliant_histogram_merge(&timings->phases[p], &other->phases[p]);
     pliant_punctuality_merge(&timings->punctuality, &other->punctuality);
     timings->rough_count += other->rough_count;

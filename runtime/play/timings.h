@@ -6,15 +6,6 @@
 
 #include "pliant/hierarchy.h"
 
-typedef enum pliant_phase {
-    PLIANT_PHASE_CAPACITANCE,  // assembling and factoring C
-    PLIANT_PHASE_CONTACT,      // selective reconstruction and C^-1
-    PLIANT_PHASE_SUMMATION,    // sparse sums
-    PLIANT_PHASE_SURFACE,      // inverse transform of the surface
-    PLIANT_PHASE_TOTAL,        // from the state to the surface, by the player's clock
-    PLIANT_PHASE_COUNT,
-} pliant_phase;
-
 // How steps kept their deadline, and on which levels they were solved.
 typedef struct pliant_punctuality {
     int64_t step_count;
@@ -28,13 +19,13 @@ typedef struct pliant_punctuality {
 } pliant_punctuality;                              // zeroed is empty
 
 typedef struct pliant_timings {
-    pliant_histogram phases[PLIANT_PHASE_COUNT];
+    pliant_play_kind kind;  // whose phases these are; of the last step that was added
+    pliant_histogram phases[PLIANT_PHASE_LIMIT];
     pliant_punctuality punctuality;
     int64_t rough_count;       // steps that solved with PLIANT_ROUGH
     int32_t most_constraints;  // the largest s
-} pliant_timings;              // zeroed is empty; about 300 kB
+} pliant_timings;              // zeroed is empty; about 500 kB
 
-const char *pliant_phase_name(pliant_phase phase);  // static
 void pliant_timings_add(pliant_timings *timings, const pliant_step *step);
 void pliant_timings_merge(pliant_timings *timings, const pliant_timings *other);
 void pliant_punctuality_merge(pliant_punctuality *punctuality, const pliant_punctuality *other);
