@@ -117,15 +117,35 @@ static pliant_status parse_impulse(pliant_words *c, pliant_statement *s)
     return status < 0 ? status : pliant_words_vector(c, s->value);
 }
 
+// none, all, or some of self, bodies, surfaces; [friction MU]
 static pliant_status parse_collide(pliant_words *c, pliant_statement *s)
 {
-    const pliant_word w = pliant_words_take(c);
-    if (pliant_word_is(w, "none")) s->count = PLIANT_COLLIDE_NONE;
-    else if (pliant_word_is(w, "self")) s->count = PLIANT_COLLIDE_SELF;
-    else if (pliant_word_is(w, "bodies")) s->count = PLIANT_COLLIDE_BODIES;
-    else if (pliant_word_is(w, "all")) s->count = PLIANT_COLLIDE_SELF | PLIANT_COLLIDE_BODIES;
-    else return pliant_words_refuse(c, PLIANT_ERR_FORMAT, w, "none, self, bodies or all");
-    return PLIANT_OK;
+    static const struct {
+        const char *word;
+        int64_t bit;
+    } kinds[] = {{"self", PLIANT_COLLIDE_SELF},
+                 {"bodies", PLIANT_COLLIDE_BODIES},
+                 {"surfaces", PLIANT_COLLIDE_SURFACES}};
+    const pliant_word first = pliant_words_take(c);
+    s->count = PLIANT_COLLIDE_NONE;
+    if (pliant_word_is(first, "none")) return PLIANT_OK;
+    if (pliant_word_is(first, "all")) {
+        s->count = PLIANT_COLLIDE_SELF | PLIANT_COLLIDE_BODIES | PLIANT_COLLIDE_SURFACES;
+        return pliant_shape_parse_friction(c, s);
+    }
+    for (pliant_word w = first; w.length > 0; w = pliant_words_take(c)) {
+        int k = 0;
+        while (k < 3 && !pliant_word_is(w, kinds[k].word)) k++;
+        if (k == 3)
+            return pliant_words_refuse(c, PLIANT_ERR_FORMAT, w,
+                                       "none, all, or some of self, bodies and surfaces");
+        s->count |= kinds[k].bit;
+        if (pliant_word_is(pliant_words_peek(c), "friction"))
+            return pliant_shape_parse_friction(c, s);
+    }
+    return s->count ? PLIANT_OK
+                    : pliant_words_refuse(c, PLIANT_ERR_FORMAT, first,
+                                          "none, all, or some of self, bodies and surfaces");
 }
 
 static pliant_status parse_bone(pliant_words *c, pliant_statement *s)
@@ -188,10 +208,16 @@ const char *pliant_scene_statement_keyword(pliant_statement_kind kind)
     return NULL;
 }
 
-// SHAPE [friction MU] [as NAME]
+// SHAPE [taper R] [friction MU] [as NAME]; a taper of capsules only
 static pliant_status parse_obstacle(pliant_words *c, pliant_word w, pliant_statement *s)
 {
     pliant_status status = pliant_shape_parse(c, w, s);
+    if (status == PLIANT_OK && s->shape == PLIANT_SHAPE_CAPSULE &&
+        pliant_word_is(pliant_words_peek(c), "taper")) {
+        pliant_words_take(c);
+        s->has_taper = 1;
+        status = pliant_words_not_negative(c, "a radius, a number >= 0", &s->taper);
+    }
     if (status == PLIANT_OK) status = pliant_shape_parse_friction(c, s);
     if (status < 0 || !pliant_word_is(pliant_words_peek(c), "as")) return status;
     pliant_words_take(c);

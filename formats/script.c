@@ -94,3 +94,18 @@ pliant_status pliant_script_next(pliant_script *script, pliant_statement *statem
     *statement = s;
     return PLIANT_OK;
 }
+
+pliant_statement_family pliant_script_family(const char *path)
+{
+    pliant_script *script = NULL;
+    pliant_statement s = {.kind = PLIANT_STATEMENT_NONE};
+    pliant_statement_family family = PLIANT_FAMILY_COMMON;
+    int more = 1;
+    if (strcmp(path, "-") == 0 || pliant_script_open(path, &script, NULL) < 0) return family;
+    while (family == PLIANT_FAMILY_COMMON && s.kind != PLIANT_STATEMENT_STEP) {
+        if (pliant_script_next(script, &s, &more, NULL) < 0 || !more) break;
+        family = pliant_statement_family_of(s.kind);
+    }
+    pliant_script_close(script);
+    return family;
+}

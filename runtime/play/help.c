@@ -6,7 +6,8 @@
 static const char options[] =
     "usage: pliant-play [options] MODEL.h5 [SCRIPT]\n"
     "\n"
-    "Plays a contact script on a model that pliant-precompute made. SCRIPT is a file;\n"
+    "Plays a contact script on a model that pliant-precompute made: on its Green's\n"
+    "functions, or on its lattice (--lattice CELLS there). SCRIPT is a file;\n"
     "`-` or none is standard input, answered line by line: every step prints its line\n"
     "at once, expect prints ok or the failure, other statements print nothing. After a\n"
     "script file, a short table: timings by phase in microseconds, then the probes'\n"
@@ -21,6 +22,7 @@ static const char options[] =
     "                          deformed surface, displacement, traction. DIR is made\n"
     "                          when absent, refused when it holds another series\n"
     "      --force             write into DIR all the same; the other files stay\n"
+    "      --every N           -o, --frames, --vtk: every N-th step only\n"
     "      --lod L             reconstruct the surface up to level L only (0 coarsest).\n"
     "                          --frames and --vtk then hold the vertices of level L;\n"
     "                          probes and expect stay exact\n"
@@ -43,6 +45,10 @@ static const char options[] =
     "      --compare DENSE.h5  solve every step with the dense matrices too (written by\n"
     "                          pliant-precompute --dense), and print the relative RMS\n"
     "                          and MAX differences\n"
+    "      --lattice           play the lattice of a model that has Green's functions too,\n"
+    "                          whatever the script begins with\n"
+    "      --particles         --vtk also writes DIR/pliant_particles.pvd: all particles of\n"
+    "                          the lattices\n"
     "      --json              JSON instead of text: one object at the end; from\n"
     "                          standard input also one per step and expect, a line each\n"
     "      --no-verify         do not verify the model's checksums at the start\n"
@@ -79,6 +85,44 @@ static const char language[] =
     "  dt SECONDS                    time that a step takes, 0.001 at the start\n"
     "  step [COUNT]                  solve now, or COUNT times\n"
     "  expect NAME X Y Z TOLERANCE   fail when the probe is further off at the last step\n"
+    "\n";
+
+static const char scenes[] =
+    "On lattices there are no conditions and no statics, but bodies that move, and these\n"
+    "statements beside probe, dt, gravity, step, expect, move, drop and release all. A\n"
+    "file without Green's functions plays like this; of one with both, the first\n"
+    "statement that belongs to one kind decides. PARTICLES are [instance I] K, the\n"
+    "lattice's number, or [instance I] near X Y Z [radius R]: the nearest now, and all\n"
+    "within R. SHAPES are those of tools, and box X Y Z X Y Z, its least and greatest\n"
+    "corner; a capsule may have taper R, its radius at the other end.\n"
+    "\n"
+    "  instances N [at X Y Z] [step X Y Z] [columns C] [rows R] [random SEED]\n"
+    "      [velocity X Y Z]          N copies, the first at X Y Z from its rest position, C\n"
+    "                                along x, R along y, then along z; random: each turned.\n"
+    "                                Before the first grab, impulse, bone or step\n"
+    "  damping K [every N]           towards the rigid motion of regions, 0 to 1\n"
+    "  rigid-damping K               towards the rigid motion of the whole body\n"
+    "  strain-limit S                links stretched by more than this part break (0: none)\n"
+    "                                (the first limit before the first grab ... or step)\n"
+    "  SHAPE [friction MU] [as NAME] an obstacle: plane, sphere, box, capsule. Said again\n"
+    "                                by its name, it is put there\n"
+    "  collide none | all | self bodies surfaces [friction MU]   what collides: bodies with\n"
+    "                                themselves, with each other, with others' surfaces;\n"
+    "                                bodies at the start\n"
+    "  grab PARTICLES [NAME]         hold them where they are; let NAME lets them go\n"
+    "  move NAME X Y Z [over COUNT]  a grab, bone or obstacle, in so many steps\n"
+    "  turn NAME X Y Z DEGREES [over COUNT]   about an axis through its point\n"
+    "  impulse PARTICLES X Y Z       at once\n"
+    "  bone NAME X Y Z               a rigid bone with its joint there; bind NAME PARTICLES\n"
+    "                                makes particles go along with it\n"
+    "  probe NAME instance I ...     of that instance; the first is 0\n"
+    "\n"
+    "-o: constraints is the number of particles held; the contact force is what obstacles,\n"
+    "grabs and bones exert, from the momentum of all. --frames: all instances one after\n"
+    "the other, displacement from the model's rest positions whatever the placement, and\n"
+    "normal. --vtk: all instances in one file per step, `instance` tells them apart, and\n"
+    "DIR/pliant_obstacles.pvd. --threads N: N threads of one world, with the same results.\n"
+    "--lod, --deadline-us, --passive, --detail and --compare are of Green's functions.\n"
     "\n";
 
 static const char ending[] =
@@ -120,4 +164,4 @@ static const char props[] =
     "as many to settle.\n"
     "\n";
 
-const char *const pliant_play_help[] = {options, notes, language, props, ending, NULL};
+const char *const pliant_play_help[] = {options, notes, language, props, scenes, ending, NULL};

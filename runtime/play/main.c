@@ -11,6 +11,7 @@
 #include <string.h>
 
 enum { DONE = 0, FAILED = 1, MISUSED = 2 };
+enum { WORLD_THREAD_LIMIT = 64 };  // pliant_world_def.thread_count
 
 static int complain(const pliant_error *err, int status)
 {
@@ -48,34 +49,60 @@ static void write_end(const pliant_play_options *options, const pliant_report *r
     } else if (report->compare) pliant_report_write_compare(report->compare, stdout);
 }
 
-static pliant_status play(const pliant_play_options *options, const pliant_model *model,
-                          int32_t level, pliant_outputs *outputs, pliant_error *err)
+// What --threads means depends on the kind: of a lattice the threads of one world, of Green's
+// functions players side by side.
+static pliant_status share_threads(const pliant_play_options *options, const pliant_model *model,
+                                   pliant_crew_def *def, pliant_error *err)
 {
+    // Without Green's functions no vertex is free or fixed.
     const pliant_model_info info = pliant_model_describe(model);
-    const pliant_observer observer = pliant_outputs_observer(outputs);
+    const int has_greens = info.free_count + info.fixed_count > 0;
+    int is_lattice = options->lattice || !has_greens;
+    if (!is_lattice && options->threads > 1)
+        is_lattice = pliant_script_family(options->script) == PLIANT_FAMILY_LATTICE;
+    if (is_lattice && options->threads > WORLD_THREAD_LIMIT)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--threads: expected at most %d for a lattice, found %d",
+                                WORLD_THREAD_LIMIT, (int)options->threads);
+    if (options->lattice) def->player.kind_rule = PLIANT_KIND_LATTICE;
+    def->threads = is_lattice ? 1 : options->threads;
+    def->player.thread_count = is_lattice ? options->threads : 1;
+    return pliant_play_options_check_script(options, def->threads, err);
+}
+
+static pliant_crew_def define(const pliant_play_options *options, const pliant_model *model,
+                              int32_t level)
+{
     const int is_streaming = strcmp(options->script, "-") == 0;
     pliant_crew_def def = {
         .script = options->script,
         .player = pliant_player_default(model),
-        .threads = options->threads,
         .repeat = options->repeat,
-        .observer = &observer,
     };
     def.player.script_name = is_streaming ? "standard input" : options->script;
     def.player.level = level;
+    def.player.greens_option = pliant_play_options_of_greens(options);
     if (options->deadline_us >= 0) def.player.deadline_ns = (int64_t)options->deadline_us * 1000;
     if (options->passive) def.player.compliance = PLIANT_COMPLIANCE_PASSIVE;
     if (options->compare) def.player.prop_rule = PLIANT_PROPS_REFUSED;
     if (options->csv || (options->json && is_streaming))
         def.player.probe_rule = PLIANT_PROBES_FIRST;
+    return def;
+}
 
+static pliant_status play(const pliant_play_options *options, const pliant_model *model,
+                          pliant_crew_def *def, pliant_outputs *outputs, pliant_error *err)
+{
+    const pliant_model_info info = pliant_model_describe(model);
+    const pliant_observer observer = pliant_outputs_observer(outputs);
+    def->observer = &observer;
     pliant_crew_result result;
-    pliant_status status = pliant_crew_play(model, &def, &result, err);
+    pliant_status status = pliant_crew_play(model, def, &result, err);
     if (status >= 0) status = pliant_outputs_commit(outputs, result.player, err);
     if (status >= 0) {
         const pliant_report report = {
             .model = options->model,
-            .script = def.player.script_name,
+            .script = def->player.script_name,
             .info = &info,
             .threads = options->threads,
             .repeat = options->repeat,
@@ -108,9 +135,14 @@ static int run(const pliant_play_options *options)
         exit_status = complain(&err, MISUSED);
         goto done;
     }
+    pliant_crew_def def = define(options, model, level);
+    if (share_threads(options, model, &def, &err) < 0) {
+        exit_status = complain(&err, MISUSED);
+        goto done;
+    }
     if (options->verify) status = pliant_model_verify(model, &err);
     if (status >= 0) status = pliant_outputs_open(options, model, level, &outputs, &err);
-    if (status >= 0) status = play(options, model, level, outputs, &err);
+    if (status >= 0) status = play(options, model, &def, outputs, &err);
     pipe_closed = outputs && pliant_outputs_pipe_closed(outputs);
     if (status < 0) exit_status = pipe_closed ? FAILED : complain(&err, FAILED);
     else if (pliant_outputs_refused_count(outputs) > 0) exit_status = FAILED;

@@ -24,6 +24,9 @@ enum long_only {
     OPTION_COMPARE,
     OPTION_JSON,
     OPTION_NO_VERIFY,
+    OPTION_LATTICE,
+    OPTION_PARTICLES,
+    OPTION_EVERY,
     OPTION_VERSION,
 };
 
@@ -41,6 +44,9 @@ static const struct option long_options[] = {
     {"compare", required_argument, NULL, OPTION_COMPARE},
     {"json", no_argument, NULL, OPTION_JSON},
     {"no-verify", no_argument, NULL, OPTION_NO_VERIFY},
+    {"lattice", no_argument, NULL, OPTION_LATTICE},
+    {"particles", no_argument, NULL, OPTION_PARTICLES},
+    {"every", required_argument, NULL, OPTION_EVERY},
     {"quiet", no_argument, NULL, 'q'},
     {"help", no_argument, NULL, 'h'},
     {"version", no_argument, NULL, OPTION_VERSION},
@@ -80,8 +86,8 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
         // How many levels there are, the model will say.
         return pliant_option_integer("--lod", optarg, 0, INT32_MAX, &o->level, err);
     case OPTION_DEADLINE:
-        return pliant_option_integer("--deadline-us", optarg, 0, PLIANT_SCRIPT_DEADLINE_LIMIT, &o->deadline_us,
-                                     err);
+        return pliant_option_integer("--deadline-us", optarg, 0, PLIANT_SCRIPT_DEADLINE_LIMIT,
+                                     &o->deadline_us, err);
     case OPTION_PASSIVE:
         o->passive = 1;
         return PLIANT_OK;
@@ -97,6 +103,14 @@ static pliant_status parse_option(int found, pliant_play_options *o, pliant_erro
     case OPTION_JSON:
         o->json = 1;
         return PLIANT_OK;
+    case OPTION_LATTICE:
+        o->lattice = 1;
+        return PLIANT_OK;
+    case OPTION_PARTICLES:
+        o->particles = 1;
+        return PLIANT_OK;
+    case OPTION_EVERY:
+        return pliant_option_integer("--every", optarg, 1, INT32_MAX, &o->every, err);
     case OPTION_NO_VERIFY:
         o->verify = 0;
         return PLIANT_OK;
@@ -137,26 +151,41 @@ static pliant_status check_files(const pliant_play_options *o, pliant_error *err
 }
 
 // A script that is played more than once is opened more than once.
-static pliant_status check_script(const pliant_play_options *o, pliant_error *err)
+pliant_status pliant_play_options_check_script(const pliant_play_options *options, int32_t threads,
+                                               pliant_error *err)
 {
-    if (o->repeat == 1 && o->threads == 1) return PLIANT_OK;
-    const char *option = o->repeat > 1 ? "--repeat" : "--threads";
+    if (options->repeat == 1 && threads == 1) return PLIANT_OK;
+    const char *option = options->repeat > 1 ? "--repeat" : "--threads";
     struct stat found;
-    if (strcmp(o->script, "-") == 0)
+    if (strcmp(options->script, "-") == 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "%s: expected a script file, found standard input", option);
-    if (stat(o->script, &found) == 0 && !S_ISREG(found.st_mode))
+    if (stat(options->script, &found) == 0 && !S_ISREG(found.st_mode))
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "%s: expected a regular file as script, found %.200s", option,
-                                o->script);
+                                options->script);
     return PLIANT_OK;
+}
+
+const char *pliant_play_options_of_greens(const pliant_play_options *options)
+{
+    if (options->level >= 0) return "--lod";
+    if (options->deadline_us >= 0) return "--deadline-us";
+    if (options->passive) return "--passive";
+    if (options->detail) return "--detail";
+    return options->compare ? "--compare" : NULL;
 }
 
 pliant_status pliant_play_options_parse(int argc, char **argv, pliant_play_options *options,
                                         pliant_play_request *request, pliant_error *err)
 {
-    pliant_play_options o = {
-        .script = "-", .level = -1, .repeat = 1, .threads = 1, .deadline_us = -1, .verify = 1};
+    pliant_play_options o = {.script = "-",
+                             .level = -1,
+                             .repeat = 1,
+                             .threads = 1,
+                             .deadline_us = -1,
+                             .every = 1,
+                             .verify = 1};
     opterr = 0;
     optind = 0;  // from the start, also the second time
     *request = PLIANT_PLAY_RUN;
@@ -182,7 +211,17 @@ pliant_status pliant_play_options_parse(int argc, char **argv, pliant_play_optio
     if (o.detail && !o.frames && !o.vtk)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "--detail: expected --frames or --vtk with it, found neither");
-    pliant_status status = check_script(&o, err);
+    if (o.particles && !o.vtk)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--particles: expected --vtk with it, found none");
+    const char *of_greens = pliant_play_options_of_greens(&o);
+    if (o.lattice && of_greens)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--lattice: expected no %s with it, which is about Green's "
+                                "functions",
+                                of_greens);
+    // A lattice has its threads from one play; that is known when the model is.
+    pliant_status status = pliant_play_options_check_script(&o, 1, err);
     if (status >= 0) status = check_files(&o, err);
     if (status >= 0) *options = o;
     return status;

@@ -4,6 +4,7 @@
 #include "csv.h"
 #include "frames.h"
 #include "report.h"
+#include "scene_vtk.h"
 #include "skin.h"
 
 #include "pliant/error.h"
@@ -26,6 +27,8 @@ struct pliant_outputs {
     pliant_csv *csv;  // these are NULL when not asked for
     pliant_frames *frames;
     pliant_vtk_series *vtk;
+    pliant_scene_vtk *scene_vtk;  // takes vtk over at the first step on a lattice
+    int is_widened;               // 1: frames and vtk know of the instances
     pliant_skin *skin;
     pliant_compare *compare;
     pliant_compare_summary compared;
@@ -100,6 +103,7 @@ pliant_status pliant_outputs_open(const pliant_play_options *options, const plia
 void pliant_outputs_destroy(pliant_outputs *outputs)
 {
     if (!outputs) return;
+    pliant_scene_vtk_abandon(outputs->scene_vtk);
     pliant_vtk_series_abandon(outputs->vtk);
     pliant_frames_abandon(outputs->frames);
     pliant_csv_abandon(outputs->csv);
@@ -131,6 +135,11 @@ pliant_status pliant_outputs_commit(pliant_outputs *outputs, const pliant_player
         pliant_vtk_series *vtk = outputs->vtk;
         outputs->vtk = NULL;
         status = pliant_vtk_series_commit(vtk, err);
+    }
+    if (status >= 0 && outputs->scene_vtk) {
+        pliant_scene_vtk *vtk = outputs->scene_vtk;
+        outputs->scene_vtk = NULL;
+        status = pliant_scene_vtk_commit(vtk, err);
     }
     return status;
 }
@@ -166,18 +175,59 @@ static pliant_status add_vtk(pliant_outputs *o, pliant_player *player, const pli
                                  o->skin->normals, err);
 }
 
+// The instances of a lattice are known at the first step.
+static pliant_status widen(pliant_outputs *o, const pliant_player *player, pliant_error *err)
+{
+    pliant_status status = PLIANT_OK;
+    o->is_widened = 1;
+    if (o->frames)
+        status = pliant_frames_widen(o->frames, pliant_player_surface_count(player), err);
+    if (status < 0 || !o->vtk) return status;
+    pliant_vtk_series *surface = o->vtk;
+    o->vtk = NULL;
+    return pliant_scene_vtk_create(o->model, player, surface, o->options->vtk,
+                                   o->options->force ? PLIANT_VTK_FOREIGN : PLIANT_VTK_OWN,
+                                   o->options->particles ? PLIANT_SCENE_VTK_PARTICLES
+                                                         : PLIANT_SCENE_VTK_SURFACES,
+                                   &o->scene_vtk, err);
+}
+
+static pliant_status write_scene(pliant_outputs *o, const pliant_player *player,
+                                 const pliant_step *step, pliant_error *err)
+{
+    pliant_status status = o->is_widened ? PLIANT_OK : widen(o, player, err);
+    const pliant_vec3 *normals =
+        pliant_instances_normals(pliant_scene_instances(pliant_player_scene(player)));
+    if (status >= 0 && o->frames)
+        status = pliant_frames_add(o->frames, pliant_player_surface(player), normals, step, err);
+    if (status >= 0 && o->scene_vtk) status = pliant_scene_vtk_add(o->scene_vtk, step->time, err);
+    return status;
+}
+
+static pliant_status write_greens(pliant_outputs *o, pliant_player *player, const pliant_step *step,
+                                  pliant_error *err)
+{
+    const pliant_vec3 *surface = pliant_player_surface(player);
+    pliant_status status = PLIANT_OK;
+    if (o->skin) pliant_skin_move(o->skin, surface);
+    if (o->frames)
+        status = pliant_frames_add(o->frames, o->skin ? o->skin->displacement : surface, NULL, step,
+                                   err);
+    if (status >= 0 && o->vtk) status = add_vtk(o, player, step, err);
+    return status;
+}
+
 static pliant_status stepped(void *context, pliant_player *player, const pliant_step *step,
                              pliant_error *err)
 {
     pliant_outputs *o = context;
     pliant_status status = PLIANT_OK;
-    if (o->csv) status = pliant_csv_add(o->csv, player, step, err);
-    const pliant_vec3 *surface = pliant_player_surface(player);
-    if (o->skin) pliant_skin_move(o->skin, surface);
-    if (status >= 0 && o->frames)
-        status = pliant_frames_add(o->frames, o->skin ? o->skin->displacement : surface, NULL, step,
-                                   err);
-    if (status >= 0 && o->vtk) status = add_vtk(o, player, step, err);
+    if (step->number % o->options->every == 0) {
+        if (o->csv) status = pliant_csv_add(o->csv, player, step, err);
+        if (status >= 0)
+            status = step->kind == PLIANT_PLAY_LATTICE ? write_scene(o, player, step, err)
+                                                       : write_greens(o, player, step, err);
+    }
     if (status >= 0 && o->compare) status = pliant_compare_add(o->compare, player, err);
     if (status < 0 || !o->is_streaming) return status;
     if (o->options->json) pliant_report_write_step_json(player, step, stdout);

@@ -1,4 +1,4 @@
-// player.c: executes the statements of a contact script against one solver.
+// player.c: executes the statements of a contact script against one solver, or on one scene.
 #include "player.h"
 
 #include "address.h"
@@ -19,16 +19,15 @@ struct pliant_player {
     pliant_player_def def;
     int32_t finest;  // L
 
-    pliant_conditions *conditions;
+    pliant_scene *scene;            // NULL: Green's functions,
+    pliant_conditions *conditions;  // which have these two; else NULL
     pliant_props *props;
+    int is_decided;  // 1: a statement or step has settled which
 
     pliant_vec3 *surface;  // [surface_count]
     int32_t surface_count;
 
-    pliant_probe *probes;
-    int32_t probe_count;
-    int32_t *probe_vertex;  // [probe_count]
-    pliant_vec3 *probe_u;   // [probe_count]
+    pliant_probes probes;
 
     int64_t deadline_ns;  // of a solve, from its start
     double dt;            // s
@@ -65,7 +64,45 @@ pliant_player_def pliant_player_default(const pliant_model *model)
         .prop_rule = PLIANT_PROPS_ALLOWED,
         .deadline_ns = PLIANT_NEVER,
         .compliance = PLIANT_COMPLIANCE_STORED,
+        .kind_rule = PLIANT_KIND_BY_SCRIPT,
+        .thread_count = 1,
     };
+}
+
+static pliant_status play_greens(pliant_player *player, pliant_error *err)
+{
+    player->surface_count = pliant_model_level_vertex_count(player->model, player->def.level);
+    player->surface = calloc((size_t)player->surface_count + 1, sizeof *player->surface);
+    if (!player->surface)
+        return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player of %d vertices",
+                                (int)player->info.vertex_count);
+    const pliant_status status =
+        pliant_conditions_create(player->model, player->def.compliance, &player->conditions, err);
+    if (status < 0) return status;
+    return pliant_props_create(player->model, player->conditions, &player->props, err);
+}
+
+static pliant_status play_lattice(pliant_player *player, pliant_error *err)
+{
+    if (player->def.greens_option)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "%s is about Green's functions: expected a play of those, found "
+                                "one of a lattice",
+                                player->def.greens_option);
+    const pliant_status status =
+        pliant_scene_create(player->model, player->def.thread_count, &player->scene, err);
+    if (status >= 0) player->is_decided = 1;
+    return status;
+}
+
+static void leave_greens(pliant_player *player)
+{
+    pliant_props_destroy(player->props);
+    pliant_conditions_destroy(player->conditions);
+    free(player->surface);
+    player->props = NULL;
+    player->conditions = NULL;
+    player->surface = NULL;
 }
 
 pliant_status pliant_player_create(const pliant_model *model, const pliant_player_def *def,
@@ -83,15 +120,11 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
     p->finest = info.level_count - 1;
     p->dt = default_dt;
     p->deadline_ns = def->deadline_ns;
-    p->surface_count = pliant_model_level_vertex_count(model, def->level);
-    pliant_status status = PLIANT_OK;
-    p->surface = calloc((size_t)p->surface_count + 1, sizeof *p->surface);
-    if (!p->surface)
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a player of %d vertices",
-                                  (int)info.vertex_count);
-    if (status == PLIANT_OK)
-        status = pliant_conditions_create(model, def->compliance, &p->conditions, err);
-    if (status >= 0) status = pliant_props_create(model, p->conditions, &p->props, err);
+    // Without Green's functions no vertex is free or fixed.
+    const int has_greens = info.free_count + info.fixed_count > 0;
+    const pliant_status status = def->kind_rule == PLIANT_KIND_LATTICE || !has_greens
+                                     ? play_lattice(p, err)
+                                     : play_greens(p, err);
     if (status < 0) {
         pliant_player_destroy(p);
         return status;
@@ -103,25 +136,39 @@ pliant_status pliant_player_create(const pliant_model *model, const pliant_playe
 void pliant_player_destroy(pliant_player *player)
 {
     if (!player) return;
-    pliant_props_destroy(player->props);
-    pliant_conditions_destroy(player->conditions);
-    free(player->probe_u);
-    free(player->probe_vertex);
-    free(player->probes);
-    free(player->surface);
+    leave_greens(player);
+    pliant_scene_destroy(player->scene);
+    pliant_probes_clear(&player->probes);
     free(player);
 }
 
 // ---- Nodes and values ----
 
-// The model's vertex or basis function that a statement names.
-static pliant_status resolve(const pliant_player *player, const pliant_statement *statement,
-                             pliant_address_use use, pliant_node *node, pliant_error *err)
+// 1: the surface has every vertex that a probe may look at, as it is.
+static int is_whole(const pliant_player *player)
+{
+    return player->scene || player->def.level == player->finest;
+}
+
+// The vertex of the surface that a probe's words mean.
+static pliant_status find_vertex(const pliant_player *player, const pliant_statement *statement,
+                                 int32_t *vertex, pliant_error *err)
 {
     pliant_error reason = {""};
-    const pliant_status status =
-        pliant_address_resolve(player->model, &statement->vertex, use, node, &reason);
-    return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
+    pliant_status status = PLIANT_OK;
+    pliant_node node = {0, 0};
+    if (player->scene)
+        status = pliant_scene_find_vertex(player->scene, statement, &node.vertex, &reason);
+    else if (statement->instance > 0)
+        status = pliant_error_set(&reason, PLIANT_ERR_ARGUMENT,
+                                  "instance %lld of 1: instances come before, and are a lattice's",
+                                  (long long)statement->instance);
+    else
+        status = pliant_address_resolve(player->model, &statement->vertex, PLIANT_ADDRESS_VERTEX,
+                                        &node, &reason);
+    if (status < 0) return refuse(player, statement, err, status, "%s", reason.text);
+    *vertex = node.vertex;
+    return PLIANT_OK;
 }
 
 // ---- Statements ----
@@ -148,67 +195,40 @@ static pliant_status execute_prop(pliant_player *player, const pliant_statement 
     return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
 }
 
-static const pliant_probe *find_probe(const pliant_player *player, const char *name)
-{
-    for (int32_t i = 0; i < player->probe_count; i++)
-        if (strcmp(player->probes[i].name, name) == 0) return &player->probes[i];
-    return NULL;
-}
-
-static pliant_status reserve_probe(pliant_player *player)
-{
-    const size_t count = (size_t)player->probe_count + 1;
-    pliant_probe *probes = realloc(player->probes, count * sizeof *probes);
-    if (!probes) return PLIANT_ERR_MEMORY;
-    player->probes = probes;
-    int32_t *vertex = realloc(player->probe_vertex, count * sizeof *vertex);
-    if (!vertex) return PLIANT_ERR_MEMORY;
-    player->probe_vertex = vertex;
-    pliant_vec3 *u = realloc(player->probe_u, count * sizeof *u);
-    if (!u) return PLIANT_ERR_MEMORY;
-    player->probe_u = u;
-    return PLIANT_OK;
-}
-
 static pliant_status execute_probe(pliant_player *player, const pliant_statement *statement,
                                    pliant_error *err)
 {
-    if (statement->has_instance)
-        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                      "instances are a lattice's: expected a vertex");
     if (player->def.probe_rule == PLIANT_PROBES_FIRST && player->last.number > 0)
         return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
                       "probe %s after a step: with rows written per step (-o, --json), probes must "
                       "come before the first",
                       statement->name);
-    if (find_probe(player, statement->name))
+    if (pliant_probes_find(&player->probes, statement->name))
         return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
                       "probe %s is already there: expected another name", statement->name);
-    if (player->probe_count == PLIANT_PROBE_LIMIT)
-        return refuse(player, statement, err, PLIANT_ERR_CAPACITY, "more than %d probes",
-                      PLIANT_PROBE_LIMIT);
-    pliant_node node;
-    pliant_status status = resolve(player, statement, PLIANT_ADDRESS_VERTEX, &node, err);
+    int32_t vertex = 0;
+    pliant_status status = find_vertex(player, statement, &vertex, err);
     if (status < 0) return status;
-    status = reserve_probe(player);
-    if (status < 0) return refuse(player, statement, err, status, "no memory for another probe");
-    pliant_probe *probe = &player->probes[player->probe_count];
-    *probe = (pliant_probe){.vertex = node.vertex};
-    snprintf(probe->name, sizeof probe->name, "%s", statement->name);
-    if (player->def.level == player->finest) {
+    pliant_probe probe = {.vertex = vertex % player->info.vertex_count,
+                          .instance = (int32_t)statement->instance,
+                          .place = vertex};
+    snprintf(probe.name, sizeof probe.name, "%s", statement->name);
+    if (player->last.number > 0 && is_whole(player)) {
         // The last step's surface holds the new probe too.
-        probe->step = player->last.number;
-        probe->u = player->surface[node.vertex];
+        probe.step = player->last.number;
+        probe.u = pliant_player_surface(player)[vertex];
     }
-    player->probe_vertex[player->probe_count] = node.vertex;
-    player->probe_count++;
-    return PLIANT_OK;
+    status = pliant_probes_add(&player->probes, &probe);
+    if (status == PLIANT_ERR_CAPACITY)
+        return refuse(player, statement, err, status, "more than %d probes", PLIANT_PROBE_LIMIT);
+    return status < 0 ? refuse(player, statement, err, status, "no memory for another probe")
+                      : PLIANT_OK;
 }
 
 static pliant_status execute_expect(pliant_player *player, const pliant_statement *statement,
                                     const pliant_observer *observer, pliant_error *err)
 {
-    const pliant_probe *probe = find_probe(player, statement->name);
+    const pliant_probe *probe = pliant_probes_find(&player->probes, statement->name);
     if (!probe)
         return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
                       "no probe %s: expected one declared before", statement->name);
@@ -256,17 +276,19 @@ static pliant_status execute_dt(pliant_player *player, const pliant_statement *s
 // them), so probes are then evaluated selectively: what they say does not depend on the level.
 static pliant_status read_probes(pliant_player *player)
 {
-    const int whole = player->def.level == player->finest;
-    if (!whole && player->probe_count > 0) {
+    const int whole = is_whole(player);
+    const pliant_vec3 *surface = pliant_player_surface(player);
+    pliant_probes *probes = &player->probes;
+    if (!whole && probes->count > 0) {
         const pliant_status status =
             pliant_solver_displacements(pliant_conditions_solver(player->conditions),
-                                        player->probe_vertex, player->probe_count, player->probe_u);
+                                        probes->places, probes->count, probes->scratch);
         if (status < 0) return status;
     }
-    for (int32_t i = 0; i < player->probe_count; i++) {
-        pliant_probe *probe = &player->probes[i];
+    for (int32_t i = 0; i < probes->count; i++) {
+        pliant_probe *probe = &probes->list[i];
         probe->step = player->last.number;
-        probe->u = whole ? player->surface[probe->vertex] : player->probe_u[i];
+        probe->u = whole ? surface[probe->place] : probes->scratch[i];
     }
     return PLIANT_OK;
 }
@@ -281,8 +303,31 @@ static int32_t level_of(const pliant_solver_report *solver, const pliant_props_r
     return solver->level;
 }
 
-static pliant_status step_once(pliant_player *player, const pliant_statement *statement,
-                               pliant_error *err)
+static pliant_status step_scene(pliant_player *player, const pliant_statement *statement,
+                                pliant_error *err)
+{
+    pliant_error reason = {""};
+    pliant_scene_step_report report;
+    const pliant_status status = pliant_scene_step(player->scene, player->dt, &report, &reason);
+    if (status < 0)
+        return refuse(player, statement, err, status, "step %lld: %s",
+                      (long long)player->last.number + 1, reason.text);
+    player->dt_steps++;
+    player->last = (pliant_step){
+        .number = player->last.number + 1,
+        .time = player->time_start + (double)player->dt_steps * player->dt,
+        .deadline_ns = PLIANT_NEVER,
+        .total_ns = report.phase_ns[PLIANT_SCENE_PHASE_TOTAL],
+        .kind = PLIANT_PLAY_LATTICE,
+        .report = {.constraint_count = report.held_count, .level = player->finest},
+        .force = report.force,
+    };
+    memcpy(player->last.phase_ns, report.phase_ns, sizeof report.phase_ns);
+    return PLIANT_OK;
+}
+
+static pliant_status step_greens(pliant_player *player, const pliant_statement *statement,
+                                 pliant_error *err)
 {
     const int64_t start = pliant_clock_ns(), given = player->deadline_ns;
     const int64_t deadline = given < PLIANT_NEVER - start ? start + given : PLIANT_NEVER;
@@ -322,6 +367,15 @@ static pliant_status step_once(pliant_player *player, const pliant_statement *st
         .report = report,
         .force = {force.x + props.force.x, force.y + props.force.y, force.z + props.force.z},
     };
+    return PLIANT_OK;
+}
+
+static pliant_status step_once(pliant_player *player, const pliant_statement *statement,
+                               pliant_error *err)
+{
+    pliant_status status =
+        player->scene ? step_scene(player, statement, err) : step_greens(player, statement, err);
+    if (status < 0) return status;
     status = read_probes(player);
     if (status < 0)
         return refuse(player, statement, err, status, "probes of step %lld: %s",
@@ -347,36 +401,45 @@ void pliant_player_set_deadline(pliant_player *player, int64_t deadline_ns)
     player->deadline_ns = deadline_ns;
 }
 
-pliant_status pliant_player_execute(pliant_player *player, const pliant_statement *statement,
+// Go over from Green's functions to the model's lattice with what has been said so far.
+static pliant_status change_to_lattice(pliant_player *player, const pliant_statement *statement,
+                                       pliant_error *err)
+{
+    const char *word = pliant_statement_keyword(statement->kind, statement->shape);
+    if (player->is_decided)
+        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
+                      "%s is about a lattice: this play is of Green's functions already", word);
+    const pliant_vec3 g = pliant_conditions_gravity(player->conditions);
+    const pliant_statement gravity = {.kind = PLIANT_STATEMENT_GRAVITY,
+                                      .value = {(double)g.x, (double)g.y, (double)g.z}};
+    pliant_error reason = {""};
+    pliant_status status = play_lattice(player, &reason);
+    if (status >= 0) status = pliant_scene_execute(player->scene, &gravity, &reason);
+    if (status < 0) {
+        pliant_scene_destroy(player->scene);
+        player->scene = NULL;
+        player->is_decided = 0;
+        return refuse(player, statement, err, status, "%s is about a lattice: %s", word,
+                      reason.text);
+    }
+    leave_greens(player);
+    return PLIANT_OK;
+}
+
+static pliant_status execute_scene(pliant_player *player, const pliant_statement *statement,
+                                   pliant_error *err)
+{
+    pliant_error reason = {""};
+    const pliant_status status = pliant_scene_execute(player->scene, statement, &reason);
+    return status < 0 ? refuse(player, statement, err, status, "%s", reason.text) : PLIANT_OK;
+}
+
+static pliant_status execute_common(pliant_player *player, const pliant_statement *statement,
                                     const pliant_observer *observer, pliant_error *err)
 {
     switch (statement->kind) {
-    case PLIANT_STATEMENT_NONE:
-        return PLIANT_OK;
-    case PLIANT_STATEMENT_VERSION:
-        return PLIANT_OK;  // the parser accepts what it knows
     case PLIANT_STATEMENT_PROBE:
         return execute_probe(player, statement, err);
-    case PLIANT_STATEMENT_DISPLACE:
-    case PLIANT_STATEMENT_TRACTION:
-    case PLIANT_STATEMENT_FORCE:
-    case PLIANT_STATEMENT_SUPPORT:
-    case PLIANT_STATEMENT_GRAVITY:
-    case PLIANT_STATEMENT_RELEASE:
-        return execute_condition(player, statement, err);
-    case PLIANT_STATEMENT_PATCH:
-    case PLIANT_STATEMENT_PATCH_DISPLACE:
-    case PLIANT_STATEMENT_PATCH_RELEASE:
-    case PLIANT_STATEMENT_CONTACT:
-    case PLIANT_STATEMENT_TOOL:
-    case PLIANT_STATEMENT_PROXY:
-    case PLIANT_STATEMENT_MOVE:
-    case PLIANT_STATEMENT_DROP:
-        return execute_prop(player, statement, err);
-    case PLIANT_STATEMENT_DEADLINE:
-        pliant_player_set_deadline(player,
-                                   statement->count < 0 ? PLIANT_NEVER : 1000 * statement->count);
-        return PLIANT_OK;
     case PLIANT_STATEMENT_DT:
         return execute_dt(player, statement, err);
     case PLIANT_STATEMENT_STEP:
@@ -384,11 +447,49 @@ pliant_status pliant_player_execute(pliant_player *player, const pliant_statemen
     case PLIANT_STATEMENT_EXPECT:
         return execute_expect(player, statement, observer, err);
     default:
-        return refuse(player, statement, err, PLIANT_ERR_ARGUMENT,
-                      "%s is about a lattice: expected statements about Green's functions",
-                      pliant_statement_keyword(statement->kind, statement->shape));
+        return PLIANT_OK;  // of the versions the parser accepts what it knows
     }
 }
+
+pliant_status pliant_player_execute(pliant_player *player, const pliant_statement *statement,
+                                    const pliant_observer *observer, pliant_error *err)
+{
+    const pliant_statement_family family = pliant_statement_family_of(statement->kind);
+    if (family == PLIANT_FAMILY_LATTICE && !player->scene) {
+        const pliant_status status = change_to_lattice(player, statement, err);
+        if (status < 0) return status;
+    }
+    if (family == PLIANT_FAMILY_GREENS || statement->kind == PLIANT_STATEMENT_STEP)
+        player->is_decided = 1;
+    switch (statement->kind) {
+    case PLIANT_STATEMENT_NONE:
+    case PLIANT_STATEMENT_VERSION:
+    case PLIANT_STATEMENT_PROBE:
+    case PLIANT_STATEMENT_DT:
+    case PLIANT_STATEMENT_STEP:
+    case PLIANT_STATEMENT_EXPECT:
+        return execute_common(player, statement, observer, err);
+    default:
+        break;
+    }
+    if (player->scene) return execute_scene(player, statement, err);
+    switch (statement->kind) {
+    case PLIANT_STATEMENT_DISPLACE:
+    case PLIANT_STATEMENT_TRACTION:
+    case PLIANT_STATEMENT_FORCE:
+    case PLIANT_STATEMENT_SUPPORT:
+    case PLIANT_STATEMENT_GRAVITY:
+    case PLIANT_STATEMENT_RELEASE:
+        return execute_condition(player, statement, err);
+    case PLIANT_STATEMENT_DEADLINE:
+        pliant_player_set_deadline(player,
+                                   statement->count < 0 ? PLIANT_NEVER : 1000 * statement->count);
+        return PLIANT_OK;
+    default:
+        return execute_prop(player, statement, err);
+    }
+}
+
 // A refusal that the next line may survive: the script's or the model's, not the machine's.
 static int is_refusal(pliant_status status)
 {
@@ -423,11 +524,13 @@ const pliant_step *pliant_player_last(const pliant_player *player)
 
 const pliant_vec3 *pliant_player_surface(const pliant_player *player)
 {
+    if (player->scene) return pliant_instances_displacements(pliant_scene_instances(player->scene));
     return player->surface;
 }
 
 int32_t pliant_player_surface_count(const pliant_player *player)
 {
+    if (player->scene) return pliant_instances_surface_count(pliant_scene_instances(player->scene));
     return player->surface_count;
 }
 
@@ -438,13 +541,29 @@ int32_t pliant_player_level(const pliant_player *player)
 
 const pliant_probe *pliant_player_probes(const pliant_player *player, int32_t *count)
 {
-    *count = player->probe_count;
-    return player->probes;
+    *count = player->probes.count;
+    return player->probes.list;
 }
 
 const pliant_condition *pliant_player_conditions(const pliant_player *player, int32_t *count)
 {
-    return pliant_conditions_list(player->conditions, count);
+    *count = 0;
+    return player->conditions ? pliant_conditions_list(player->conditions, count) : NULL;
+}
+
+pliant_status pliant_player_prepare(pliant_player *player, pliant_error *err)
+{
+    return player->scene ? pliant_scene_prepare(player->scene, err) : PLIANT_OK;
+}
+
+pliant_play_kind pliant_player_kind(const pliant_player *player)
+{
+    return player->scene ? PLIANT_PLAY_LATTICE : PLIANT_PLAY_GREENS;
+}
+
+const pliant_scene *pliant_player_scene(const pliant_player *player)
+{
+    return player->scene;
 }
 
 pliant_vec3 pliant_player_gravity(const pliant_player *player)

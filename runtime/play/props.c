@@ -156,6 +156,8 @@ static pliant_status move_over(void *context, pliant_solver *solver)
 
 const pliant_prop *pliant_props_list(const pliant_props *props, int32_t *count)
 {
+    *count = 0;
+    if (!props) return NULL;
     *count = props->count;
     return props->list;
 }

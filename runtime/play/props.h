@@ -41,7 +41,7 @@ PLIANT_UNUSED_RESULT pliant_status pliant_props_create(const pliant_model *model
                                                        pliant_props **props, pliant_error *err);
 void pliant_props_destroy(pliant_props *props);  // NULL is fine
 
-// In the order of first declaration; borrowed until the next declaration.
+// In the order of first declaration; borrowed until the next declaration. NULL has none.
 const pliant_prop *pliant_props_list(const pliant_props *props, int32_t *count);
 int pliant_props_is_empty(const pliant_props *props);  // 1: nothing is present
 // The patch that a vertex belongs to; NULL: none.

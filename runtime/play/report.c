@@ -66,6 +66,16 @@ static void write_props(const pliant_player *player, int width, FILE *stream)
     }
 }
 
+// "812", or "812/3" of an instance.
+static const char *place_of(const pliant_player *player, const pliant_probe *probe, char text[32])
+{
+    const pliant_scene *scene = pliant_player_scene(player);
+    if (scene && pliant_instances_count(pliant_scene_instances(scene)) > 1)
+        snprintf(text, 32, "%d/%d", (int)probe->instance, (int)probe->vertex);
+    else snprintf(text, 32, "%d", (int)probe->vertex);
+    return text;
+}
+
 static int widest_name(const pliant_player *player)
 {
     size_t width = strlen("contact force");
@@ -86,7 +96,8 @@ static void write_probes(const pliant_player *player, FILE *stream)
     const int width = widest_name(player);
     fprintf(stream, "%-*s %8s %13s %13s %13s\n", width, "last step", "vertex", "x", "y", "z");
     for (int32_t i = 0; i < count; i++) {
-        fprintf(stream, "%-*s %8d ", width, probes[i].name, (int)probes[i].vertex);
+        char place[32];
+        fprintf(stream, "%-*s %8s ", width, probes[i].name, place_of(player, &probes[i], place));
         // Declared after the last step, on a level that was not reconstructed.
         if (probes[i].step == 0) fprintf(stream, "%13s %13s %13s\n", "-", "-", "-");
         else
@@ -122,11 +133,25 @@ void pliant_report_write(const pliant_report *report, FILE *stream)
         return;
     }
     const int most = result->timings->most_constraints;
-    fprintf(stream, ", up to %d %s, surface of %d of %d vertices (level %d of 0..%d)\n", most,
-            most == 1 ? "constraint" : "constraints", (int)pliant_player_surface_count(player),
-            (int)report->info->vertex_count, (int)pliant_player_level(player),
-            (int)report->info->level_count - 1);
-    if (report->threads > 1 || report->repeat > 1)
+    const pliant_scene *scene = pliant_player_scene(player);
+    if (scene) {
+        const pliant_instances *instances = pliant_scene_instances(scene);
+        const int count = pliant_instances_count(instances);
+        fprintf(stream, ", %d %s of %d particles and %d vertices, up to %d particles held\n", count,
+                count == 1 ? "instance" : "instances",
+                (int)pliant_instances_particle_count(instances),
+                (int)pliant_instances_vertex_count(instances), most);
+        if (report->threads > 1) fprintf(stream, "%d threads\n", (int)report->threads);
+    } else
+        fprintf(stream, ", up to %d %s, surface of %d of %d vertices (level %d of 0..%d)\n", most,
+                most == 1 ? "constraint" : "constraints", (int)pliant_player_surface_count(player),
+                (int)report->info->vertex_count, (int)pliant_player_level(player),
+                (int)report->info->level_count - 1);
+    if (scene && report->repeat > 1)
+        fprintf(stream, "%d passes: %lld steps in %.3f s, %.0f steps/s\n", (int)report->repeat,
+                (long long)result->step_count, result->seconds,
+                (double)result->step_count / result->seconds);
+    else if (!scene && (report->threads > 1 || report->repeat > 1))
         fprintf(stream, "%d %s x %d %s: %lld steps in %.3f s, %.0f steps/s\n", (int)report->threads,
                 report->threads == 1 ? "solver" : "solvers at once", (int)report->repeat,
                 report->repeat == 1 ? "pass" : "passes", (long long)result->step_count,

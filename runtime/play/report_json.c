@@ -71,6 +71,16 @@ static void put_punctuality(const pliant_report *report, FILE *stream)
             1e-3 * (double)p.worst_lateness_ns);
 }
 
+static void put_instances(const pliant_instances *instances, int32_t threads, FILE *stream)
+{
+    const pliant_lattice_info info = pliant_lattice_describe(pliant_instances_lattice(instances));
+    fprintf(stream,
+            ",\"kind\":\"lattice\",\"instances\":%d,\"particles\":%d,\"half_width\":%d,"
+            "\"regions\":%d,\"threads\":%d",
+            (int)pliant_instances_count(instances), (int)info.particle_count, (int)info.half_width,
+            (int)info.region_count, (int)threads);
+}
+
 static void put_worst(const char *name, double value, int64_t step, FILE *stream)
 {
     fprintf(stream, ",\"%s\":", name);
@@ -139,9 +149,11 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
             (int)pliant_player_level(player), (int)report->info->vertex_count,
             (int)pliant_player_surface_count(player), (int)result->timings->most_constraints,
             (long long)(result->timings->rough_count + result->warm_up->rough_count),
-            (int)report->threads, (int)report->repeat, (long long)result->step_count,
-            result->seconds);
+            pliant_player_scene(player) ? 1 : (int)report->threads, (int)report->repeat,
+            (long long)result->step_count, result->seconds);
     put_number((double)result->step_count / result->seconds, stream);
+    const pliant_scene *scene = pliant_player_scene(player);
+    if (scene) put_instances(pliant_scene_instances(scene), report->threads, stream);
     fputs(",\"us\":", stream);
     put_phases(result->timings, stream);
     if (report->repeat > 1) {
@@ -154,7 +166,9 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
     for (int32_t i = 0; i < count; i++) {
         if (i) fputc(',', stream);
         put_text(probes[i].name, stream);
-        fprintf(stream, ":{\"vertex\":%d,\"displacement\":", (int)probes[i].vertex);
+        fprintf(stream, ":{\"vertex\":%d,", (int)probes[i].vertex);
+        if (scene) fprintf(stream, "\"instance\":%d,", (int)probes[i].instance);
+        fputs("\"displacement\":", stream);
         if (probes[i].step == 0) fputs("null", stream);
         else put_vec3(probes[i].u, stream);
         fputc('}', stream);
@@ -162,7 +176,7 @@ void pliant_report_write_json(const pliant_report *report, FILE *stream)
     fputs("},\"force\":", stream);
     put_vec3(pliant_player_last(player)->force, stream);
     put_props(player, stream);
-    put_punctuality(report, stream);
+    if (!scene) put_punctuality(report, stream);
     if (report->compare) {
         fputs(",\"compare\":", stream);
         put_compare(report->compare, stream);

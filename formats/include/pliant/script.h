@@ -43,8 +43,8 @@ typedef enum pliant_statement_kind {
     PLIANT_STATEMENT_GRAB,           // grab PARTICLES [NAME]
     PLIANT_STATEMENT_LET,            // let NAME
     PLIANT_STATEMENT_IMPULSE,        // impulse PARTICLES X Y Z
-    PLIANT_STATEMENT_OBSTACLE,       // SHAPE [friction MU] [as NAME]
-    PLIANT_STATEMENT_COLLIDE,        // collide none | self | bodies | all
+    PLIANT_STATEMENT_OBSTACLE,       // SHAPE [taper R] [friction MU] [as NAME]
+    PLIANT_STATEMENT_COLLIDE,       // collide none | all | self bodies surfaces [friction MU]
     PLIANT_STATEMENT_BONE,           // bone NAME X Y Z
     PLIANT_STATEMENT_BIND,           // bind NAME PARTICLES
     PLIANT_STATEMENT_TURN,           // turn NAME AX AY AZ DEGREES [over COUNT]
@@ -86,8 +86,9 @@ typedef enum pliant_shape_kind {
 // What collides with what, of lattices; numbers may be added.
 typedef enum pliant_collide {
     PLIANT_COLLIDE_NONE = 0,
-    PLIANT_COLLIDE_SELF = 1,    // a body with itself
-    PLIANT_COLLIDE_BODIES = 2,  // bodies with each other
+    PLIANT_COLLIDE_SELF = 1,      // a body with itself
+    PLIANT_COLLIDE_BODIES = 2,    // bodies with each other
+    PLIANT_COLLIDE_SURFACES = 4,  // particles with the surfaces of other bodies
 } pliant_collide;
 
 // How the copies of `instances` are laid out: copy k stands at value + (k % columns, k / columns %
@@ -115,6 +116,8 @@ typedef struct pliant_statement {
     pliant_shape_kind shape;
     double end[3];
     double friction, stiffness;  // 0: not stated
+    int32_t has_taper;           // 1: of an obstacle that is a capsule,
+    double taper;                // the radius at its other end; 0 unless has_taper
     int32_t has_instance;        // of probe and PARTICLES
     int64_t instance;            // from 0; 0 unless has_instance
     pliant_copies copies;        // of instances
@@ -130,6 +133,10 @@ typedef struct pliant_script pliant_script;  // an open script: a stream, its na
 PLIANT_UNUSED_RESULT pliant_status pliant_script_open(const char *path, pliant_script **script,
                                                       pliant_error *err);
 void pliant_script_close(pliant_script *script);
+
+// What a script that can be read more than once asks for: the family of its first statement that
+// belongs to one kind of play; common when a step or a mistake comes first, or it cannot be read.
+pliant_statement_family pliant_script_family(const char *path);
 
 // Read on to the next statement that is not blank. *more is 0 at the end of the script. Refusals
 // read "name:line:column: expected ..., found ..." and leave the parser at the next line, with
