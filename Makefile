@@ -226,7 +226,7 @@ ifeq ($(BUILD),tsan)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif
 ifneq ($(HAVE_PNG),yes)
-TEST_SRC  := $(filter-out $(addprefix tests/runtime/test_,draw.c raster.c camera.c colour_map.c),$(TEST_SRC))
+TEST_SRC  := $(filter-out $(addprefix tests/runtime/test_,draw.c raster.c camera.c colour_map.c) tests/lattice/test_scene_drawing.c,$(TEST_SRC))
 endif
 TESTS     := $(patsubst tests/%.c,$(OUT)/tests/%,$(filter $(wildcard tests/*/test_$(T).c),$(TEST_SRC)))
 BENCH_SRC := $(sort $(wildcard tests/bench/bench_*.c))

@@ -5,10 +5,12 @@
 #include "png_file.h"
 #include "raster.h"
 #include "recording.h"
+#include "scene_drawing.h"
 #include "skin.h"
 
 #include "pliant/error.h"
 #include "pliant/pliant.h"
+#include "pliant/script.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +21,7 @@
 
 // The size that gives every panel room, when none was asked for: as wide as the default picture,
 // its panels a little wider than high, and a line for the legend.
-static void choose_size(pliant_picture_def *picture, int32_t panel_count)
+void pliant_drawing_choose_size(pliant_picture_def *picture, int32_t panel_count)
 {
     if (picture->width > 0) return;
     const int32_t columns =
@@ -31,8 +33,8 @@ static void choose_size(pliant_picture_def *picture, int32_t panel_count)
 }
 
 // Which steps to draw, from the options: ascending, PLIANT_RECORDING_END for the last.
-static pliant_status choose_steps(const pliant_draw_options *options, int64_t *steps,
-                                  int32_t *step_count, pliant_error *err)
+pliant_status pliant_drawing_choose_steps(const pliant_draw_options *options, int64_t *steps,
+                                          int32_t *step_count, pliant_error *err)
 {
     int32_t count = 0;
     if (options->sheet_columns && options->step_count == 0) {
@@ -69,7 +71,7 @@ static pliant_status make_panels(const pliant_draw_options *options, const plian
     if (!options->script || options->show == PLIANT_SHOW_REST) return PLIANT_OK;
     int64_t steps[PLIANT_RECORDING_LIMIT + 1];
     int32_t count = 0;
-    pliant_status status = choose_steps(options, steps, &count, err);
+    pliant_status status = pliant_drawing_choose_steps(options, steps, &count, err);
     if (status < 0) return status;
     status = pliant_recording_create(model, level, options->script, steps, count, recording, err);
     if (status < 0) return status;
@@ -150,6 +152,14 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
                                   options->model, level, info.level_count - 1);
         goto done;
     }
+    // Without Green's functions no vertex is free or fixed.
+    const int has_greens = info.free_count + info.fixed_count > 0;
+    const int is_played = options->script && options->show != PLIANT_SHOW_REST;
+    if (is_played && (options->lattice || !has_greens ||
+                      pliant_script_family(options->script) == PLIANT_FAMILY_LATTICE)) {
+        status = pliant_scene_drawing_make(options, model, err);
+        goto done;
+    }
     if (options->detail) {
         status = pliant_skin_create(model, level, &skin, err);
         if (status < 0) goto done;
@@ -167,7 +177,7 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
     };
     pliant_picture_def picture = options->picture;
     picture.columns = options->sheet_columns;
-    choose_size(&picture, panel_count);
+    pliant_drawing_choose_size(&picture, panel_count);
     const size_t pixels = (size_t)picture.width * (size_t)picture.height;
     held = malloc((size_t)shape.vertex_count + 1);
     rgb = malloc(3 * pixels);
@@ -176,7 +186,8 @@ pliant_status pliant_drawing_make(const pliant_draw_options *options, pliant_err
                                   picture.width, picture.height);
         goto done;
     }
-    for (int32_t v = 0; v < shape.vertex_count; v++) held[v] = pliant_model_is_free(model, v) == 0;
+    for (int32_t v = 0; v < shape.vertex_count; v++)
+        held[v] = has_greens && pliant_model_is_free(model, v) == 0;
     shape.held = held;
     if (skin) status = dress(skin, &shape, panels, panel_count, &dressed, err);
     if (status < 0) goto done;

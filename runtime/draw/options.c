@@ -21,7 +21,9 @@ const char *pliant_draw_options_help(void)
            "moved,\n"
            "beside the shape at rest. Contacts are marked by dots and arrows, held vertices "
            "tinted.\n"
-           "SCRIPT - is standard input; without one the rest shape is drawn.\n"
+           "SCRIPT - is standard input; without one the rest shape is drawn. Of a lattice all "
+           "instances\n"
+           "are drawn, each in a hue of its own, with the obstacles; step 0 is where they begin.\n"
            "\n"
            "  -o, --output FILE     the picture, PNG; written whole or not at all\n"
            "      --step N          the state after step N (0: at rest); default the script's "
@@ -34,6 +36,9 @@ const char *pliant_draw_options_help(void)
            "      --view AZ,EL      seen from azimuth AZ (0: +x, 90: +y) and elevation EL, "
            "degrees;\n"
            "                        default -60,18\n"
+           "      --region BOX      show this box alone, X,Y,Z,X,Y,Z its least and greatest "
+           "corner; default\n"
+           "                        all there is in any panel\n"
            "      --size WxH        pixels, 64 to 4096 each; default by the number of panels\n"
            "      --magnify F       draw displacements F times as large; default 1\n"
            "      --range MAX       displacement at the end of the colour scale; default by the "
@@ -41,6 +46,8 @@ const char *pliant_draw_options_help(void)
            "      --level L         draw level L of the mesh, 0 the coarsest; default the finest\n"
            "      --detail          draw the detailed surface over that level (of a model made "
            "with --detail)\n"
+           "      --lattice         draw the lattice's play of a model that has Green's functions "
+           "too\n"
            "  -h, --help            this text\n"
            "      --version         the version\n"
            "\n"
@@ -136,6 +143,19 @@ static pliant_status read_view(const char *text, pliant_draw_options *options, p
     return PLIANT_OK;
 }
 
+static pliant_status read_region(const char *text, pliant_draw_options *options, pliant_error *err)
+{
+    double *region = options->picture.region;
+    const char *end = text - 1;
+    for (int k = 0; k < 6; k++) {
+        if (!read_number(end + 1, &region[k], &end) || *end != (k < 5 ? ',' : '\0') ||
+            !(fabs(region[k]) <= 1e9) || (k >= 3 && !(region[k] > region[k - 3])))
+            return refuse(err, "--region", "a box as 0,0,0,1,1,2, its least corner first", text);
+    }
+    options->picture.has_region = 1;
+    return PLIANT_OK;
+}
+
 static pliant_status read_show(const char *text, pliant_draw_options *options, pliant_error *err)
 {
     static const char *const names[] = {"both", "deformed", "rest"};
@@ -147,7 +167,21 @@ static pliant_status read_show(const char *text, pliant_draw_options *options, p
     return refuse(err, "--show", "both, deformed or rest", text);
 }
 
-enum { STEP = 256, STEPS, SHEET, SHOW, VIEW, SIZE, MAGNIFY, RANGE, LEVEL, DETAIL, VERSION };
+enum {
+    STEP = 256,
+    STEPS,
+    SHEET,
+    SHOW,
+    VIEW,
+    SIZE,
+    MAGNIFY,
+    RANGE,
+    LEVEL,
+    DETAIL,
+    LATTICE,
+    REGION,
+    VERSION
+};
 
 static pliant_status read_option(int option, const char *text, pliant_draw_options *options,
                                  pliant_error *err)
@@ -189,6 +223,11 @@ static pliant_status read_option(int option, const char *text, pliant_draw_optio
             return refuse(err, "--level", "a level from 0", text);
         options->level = (int32_t)count;
         return PLIANT_OK;
+    case REGION:
+        return read_region(text, options, err);
+    case LATTICE:
+        options->lattice = 1;
+        return PLIANT_OK;
     case DETAIL:
         options->detail = 1;
         return PLIANT_OK;
@@ -205,20 +244,14 @@ pliant_status pliant_draw_options_parse(int argc, char **argv, pliant_draw_optio
                                         pliant_error *err)
 {
     static const struct option names[] = {
-        {"output", required_argument, NULL, 'o'},
-        {"step", required_argument, NULL, STEP},
-        {"steps", required_argument, NULL, STEPS},
-        {"sheet", required_argument, NULL, SHEET},
-        {"show", required_argument, NULL, SHOW},
-        {"view", required_argument, NULL, VIEW},
-        {"size", required_argument, NULL, SIZE},
-        {"magnify", required_argument, NULL, MAGNIFY},
-        {"range", required_argument, NULL, RANGE},
-        {"level", required_argument, NULL, LEVEL},
-        {"detail", no_argument, NULL, DETAIL},
-        {"help", no_argument, NULL, 'h'},
-        {"version", no_argument, NULL, VERSION},
-        {NULL, 0, NULL, 0},
+        {"output", required_argument, NULL, 'o'},    {"step", required_argument, NULL, STEP},
+        {"steps", required_argument, NULL, STEPS},   {"sheet", required_argument, NULL, SHEET},
+        {"show", required_argument, NULL, SHOW},     {"view", required_argument, NULL, VIEW},
+        {"size", required_argument, NULL, SIZE},     {"magnify", required_argument, NULL, MAGNIFY},
+        {"range", required_argument, NULL, RANGE},   {"level", required_argument, NULL, LEVEL},
+        {"detail", no_argument, NULL, DETAIL},       {"lattice", no_argument, NULL, LATTICE},
+        {"region", required_argument, NULL, REGION}, {"help", no_argument, NULL, 'h'},
+        {"version", no_argument, NULL, VERSION},     {NULL, 0, NULL, 0},
     };
     *options = (pliant_draw_options){.picture = pliant_picture_default(), .level = -1};
     options->picture.width = options->picture.height = 0;  // by the number of panels
@@ -227,7 +260,8 @@ pliant_status pliant_draw_options_parse(int argc, char **argv, pliant_draw_optio
     for (;;) {
         const int option = getopt_long(argc, argv, ":o:h", names, NULL);
         if (option == -1) break;
-        if (option == ':' || option == '?') return pliant_option_refuse(option, argc, argv, names, err);
+        if (option == ':' || option == '?')
+            return pliant_option_refuse(option, argc, argv, names, err);
         const pliant_status status = read_option(option, optarg, options, err);
         if (status < 0) return status;
     }

@@ -19,6 +19,7 @@ typedef struct pliant_draw_options {
     int64_t steps[PLIANT_RECORDING_LIMIT];  // as given by --step or --steps
     int32_t step_count;                     // 0: the script's end, or evenly spaced for a sheet
     int32_t detail;                         // 1: the detailed surface over that level
+    int32_t lattice;                        // 1: play the lattice, whatever the script begins with
     int32_t help, version;                  // 1: asked for; nothing else is checked
 } pliant_draw_options;
 

@@ -50,13 +50,13 @@ static palette make_palette(void)
     return p;
 }
 
-static layout lay_out(const pliant_picture_def *def, const pliant_panel *panels,
-                      int32_t panel_count)
+static layout lay_out(const pliant_picture_def *def, const pliant_body_shape *shape,
+                      const pliant_panel *panels, int32_t panel_count)
 {
     layout l = {0};
     int32_t mark_count = 0;
     for (int32_t k = 0; k < panel_count; k++) {
-        if (panels[k].displacement) l.has_legend = 1;
+        if (panels[k].displacement && !shape->hue) l.has_legend = 1;
         if (panels[k].mark_count > mark_count) mark_count = panels[k].mark_count;
     }
     l.columns = def->columns > 0 && def->columns < panel_count ? def->columns : panel_count;
@@ -269,7 +269,7 @@ static void draw_centred(pliant_raster *raster, const char *text, double x, doub
 }
 
 static void draw_legend(pliant_raster *raster, const layout *l, const palette *colours,
-                        double range, double magnify)
+                        int has_held, double range, double magnify)
 {
     const double letter = PLIANT_LABEL_HEIGHT * l->dot;
     const double width = floor(fmin(0.36 * raster->width, 100 * letter));
@@ -290,15 +290,57 @@ static void draw_legend(pliant_raster *raster, const layout *l, const palette *c
     pliant_label_draw(raster, "displacement",
                       left - (pliant_label_width("displacement") + 6) * l->dot, top, l->dot,
                       colours->ink);
-    float held[3];
-    pliant_surface_held_colour(held);
     const double key = left + width + 6 * l->dot;
-    pliant_paint_rectangle(raster, key, top, letter, letter, held);
-    pliant_label_draw(raster, "held", key + letter + 3 * l->dot, top, l->dot, colours->ink);
+    if (has_held) {
+        float held[3];
+        pliant_surface_held_colour(held);
+        pliant_paint_rectangle(raster, key, top, letter, letter, held);
+        pliant_label_draw(raster, "held", key + letter + 3 * l->dot, top, l->dot, colours->ink);
+    }
     if (magnify != 1) {
         snprintf(text, sizeof text, "drawn %gx", magnify);
         pliant_label_draw(raster, text, key + letter + 33 * l->dot, top, l->dot, colours->ink);
     }
+}
+
+// ---- Surroundings ----
+
+// Draw to a panel's part of the picture only, less a margin; without a layout everywhere.
+static void clip(pliant_raster *raster, const layout *l, int32_t panel)
+{
+    const double margin = l ? l->gap / 4 : 0;
+    const double left = l ? panel % l->columns * l->panel_width + margin : 0;
+    const double top = l ? panel / l->columns * l->panel_height + margin : 0;
+    raster->left = (int32_t)left;
+    raster->top = (int32_t)top;
+    raster->right = l ? (int32_t)(left + l->panel_width - 2 * margin) : raster->width;
+    raster->bottom = l ? (int32_t)(top + l->panel_height - 2 * margin) : raster->height;
+}
+
+static pliant_surface surface_of(const pliant_obstacle_mesh *mesh)
+{
+    return (pliant_surface){.vertex_count = mesh->vertex_count,
+                            .face_count = mesh->face_count,
+                            .positions = mesh->positions,
+                            .faces = mesh->faces,
+                            .palette = PLIANT_PALETTE_ICE};
+}
+
+// Planes, what stands and lies on the first of them in shadow, then the rest. NULL: nothing.
+static pliant_status draw_surroundings(const pliant_surroundings *around,
+                                       const pliant_surface *bodies, const pliant_camera *camera,
+                                       const pliant_frame *frame, pliant_raster *raster,
+                                       pliant_error *err)
+{
+    if (!around) return PLIANT_OK;
+    const pliant_surface planes = surface_of(&around->planes);
+    const pliant_surface solids = surface_of(&around->solids);
+    const pliant_surface *const shadows[] = {bodies, &solids};
+    pliant_status status = pliant_surface_draw(&planes, camera, raster, err);
+    for (int i = 0; status >= 0 && i < 2; i++)
+        status =
+            pliant_surface_shade_ground(shadows[i], camera, around->ground, frame, raster, err);
+    return status < 0 ? status : pliant_surface_draw(&solids, camera, raster, err);
 }
 
 // ---- Picture ----
@@ -354,28 +396,38 @@ pliant_status pliant_picture_draw(const pliant_picture_def *def, const pliant_bo
     }
     for (size_t i = 0; i < n * (size_t)panel_count; i++)
         moved[i] = (float)((double)moved[i] / range);
-    double ground = INFINITY;
-    for (size_t v = 0; v < n; v++) ground = fmin(ground, shape->rest[3 * v + 2]);
+    double ground[4] = {0, 0, 1, INFINITY};
+    for (size_t v = 0; v < n; v++) ground[3] = fmin(ground[3], shape->rest[3 * v + 2]);
 
     const palette colours = make_palette();
-    const layout l = lay_out(def, panels, panel_count);
+    const layout l = lay_out(def, shape, panels, panel_count);
     const int32_t all = (int32_t)n * panel_count;
-    pliant_camera camera = pliant_camera_aim(def->azimuth, def->elevation, positions, all);
+    double corners[8][3];
+    for (int i = 0; i < 8; i++)
+        for (int c = 0; c < 3; c++) corners[i][c] = def->region[c + 3 * (i >> c & 1)];
+    const double *seen = def->has_region ? corners[0] : positions;
+    const int32_t seen_count = def->has_region ? 8 : all;
+    pliant_camera camera = pliant_camera_aim(def->azimuth, def->elevation, seen, seen_count);
     pliant_raster_clear(raster, colours.paper);
     for (int32_t k = 0; k < panel_count; k++) {
         const pliant_frame frame = frame_of(&l, k);
-        pliant_camera_fit(&camera, positions, all, &frame);
+        pliant_camera_fit(&camera, seen, seen_count, &frame);
         const pliant_surface surface = {
             .vertex_count = shape->vertex_count,
             .face_count = shape->face_count,
             .positions = positions + 3 * n * (size_t)k,
             .faces = shape->faces,
-            .value = moved + n * (size_t)k,
+            .value = shape->hue ? shape->hue : moved + n * (size_t)k,
             .held = shape->held,
+            .normals = panels[k].normals,
+            .palette = shape->hue ? PLIANT_PALETTE_HUES : PLIANT_PALETTE_MAP,
         };
-        status = pliant_surface_shade_ground(&surface, &camera, ground, &frame, raster, err);
-        if (status < 0) goto done;
-        status = pliant_surface_draw(&surface, &camera, raster, err);
+        if (panels[k].around || def->has_region) clip(raster, &l, k);
+        status = draw_surroundings(panels[k].around, &surface, &camera, &frame, raster, err);
+        if (status >= 0 && !panels[k].around)
+            status = pliant_surface_shade_ground(&surface, &camera, ground, &frame, raster, err);
+        if (status >= 0) status = pliant_surface_draw(&surface, &camera, raster, err);
+        clip(raster, NULL, 0);
         if (status < 0) goto done;
         status = draw_marks(shape, &panels[k], surface.positions, &camera, &colours, &frame, raster,
                             err);
@@ -384,7 +436,7 @@ pliant_status pliant_picture_draw(const pliant_picture_def *def, const pliant_bo
                      frame.y + frame.height + 1.2 * PLIANT_LABEL_HEIGHT * l.dot, l.dot,
                      colours.ink);
     }
-    if (l.has_legend) draw_legend(raster, &l, &colours, range, def->magnify);
+    if (l.has_legend) draw_legend(raster, &l, &colours, shape->held != NULL, range, def->magnify);
     pliant_raster_resolve(raster, rgb);
 
 done:

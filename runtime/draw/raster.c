@@ -35,6 +35,8 @@ pliant_status pliant_raster_create(int32_t width, int32_t height, int32_t sample
     r->width = width;
     r->height = height;
     r->samples = samples;
+    r->right = width;
+    r->bottom = height;
     *raster = r;
     return PLIANT_OK;
 }
@@ -79,7 +81,6 @@ void pliant_raster_triangle(pliant_raster *raster, const pliant_raster_corner *c
                             pliant_raster_shader *shader, const void *context)
 {
     const int32_t columns = raster->width * raster->samples;
-    const int32_t rows = raster->height * raster->samples;
     int64_t p[3][2];
     for (int k = 0; k < 3; k++) {
         // Written so that NaN is left out, too.
@@ -102,10 +103,12 @@ void pliant_raster_triangle(pliant_raster *raster, const pliant_raster_corner *c
         if (c[k] > high[k]) high[k] = c[k];
     }
     // Sample i lies at (i + 1/2) SUBSTEPS; division rounds towards zero, so take one more each way.
-    const int32_t first_column = clamp(low[0] / SUBSTEPS - 1, 0, columns);
-    const int32_t last_column = clamp(high[0] / SUBSTEPS + 1, -1, columns - 1);
-    const int32_t first_row = clamp(low[1] / SUBSTEPS - 1, 0, rows);
-    const int32_t last_row = clamp(high[1] / SUBSTEPS + 1, -1, rows - 1);
+    const int32_t left = raster->left * raster->samples, right = raster->right * raster->samples;
+    const int32_t top = raster->top * raster->samples, bottom = raster->bottom * raster->samples;
+    const int32_t first_column = clamp(low[0] / SUBSTEPS - 1, left, right);
+    const int32_t last_column = clamp(high[0] / SUBSTEPS + 1, left - 1, right - 1);
+    const int32_t first_row = clamp(low[1] / SUBSTEPS - 1, top, bottom);
+    const int32_t last_row = clamp(high[1] / SUBSTEPS + 1, top - 1, bottom - 1);
 
     const double whole = 1.0 / (double)llabs(area);
     const int overlay = corners[0].depth == -INFINITY;

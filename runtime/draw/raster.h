@@ -16,6 +16,7 @@ typedef struct pliant_raster {
     int32_t samples;        // sample points along a pixel's side
     float *colour;          // shape [height * samples][width * samples][3]
     float *depth;           // shape [height * samples][width * samples]; larger is farther away
+    int32_t left, top, right, bottom;  // pixels drawn to: left <= x < right; at first all
 } pliant_raster;
 
 typedef struct pliant_raster_corner {

@@ -42,10 +42,16 @@ static float dot(const float *a, const float *b)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static material make_material(void)
+static material make_material(pliant_surface_palette palette)
 {
     material m;
-    for (int i = 0; i <= MAP_COUNT; i++) pliant_colour_map_at((float)i / MAP_COUNT, m.map[i]);
+    for (int i = 0; i <= MAP_COUNT; i++) {
+        const float value = (float)i / MAP_COUNT;
+        if (palette == PLIANT_PALETTE_MAP) pliant_colour_map_at(value, m.map[i]);
+        else if (palette == PLIANT_PALETTE_HUES)
+            pliant_colour_from_oklch(0.80, 0.10, 360 * (double)value, m.map[i]);
+        else pliant_colour_from_oklch(0.93, 0.025, 235, m.map[i]);
+    }
     pliant_surface_held_colour(m.held);
     const float sum[3] = {key_light[0], key_light[1], key_light[2] + 1};
     for (int c = 0; c < 3; c++) m.halfway[c] = sum[c] / sqrtf(dot(sum, sum));
@@ -71,8 +77,15 @@ static void shade(const void *context, const float *attribute, float *colour)
         colour[c] = (skin[c] + tint * (m->held[c] - skin[c])) * light + gloss;
 }
 
-// Vertex normals in the camera's axes: the sum of the incident triangles' normals, each twice its
-// area long. shape [vertex_count][3].
+static void turn_normal(const pliant_camera *camera, const double *n, double length, float *turned)
+{
+    const double *axis[3] = {camera->right, camera->up, camera->back};
+    for (int c = 0; c < 3; c++)
+        turned[c] = (float)((n[0] * axis[c][0] + n[1] * axis[c][1] + n[2] * axis[c][2]) / length);
+}
+
+// Vertex normals in the camera's axes: those given, or the sum of the incident triangles' normals,
+// each twice its area long. shape [vertex_count][3].
 static float *find_normals(const pliant_surface *surface, const pliant_camera *camera)
 {
     float *normals = calloc((size_t)surface->vertex_count + 1, 3 * sizeof *normals);
@@ -82,7 +95,7 @@ static float *find_normals(const pliant_surface *surface, const pliant_camera *c
         free(normals);
         return NULL;
     }
-    for (int32_t f = 0; f < surface->face_count; f++) {
+    for (int32_t f = 0; f < surface->face_count && !surface->normals; f++) {
         const int32_t *v = surface->faces + 3 * (size_t)f;
         const double *a = surface->positions + 3 * (size_t)v[0],
                      *b = surface->positions + 3 * (size_t)v[1],
@@ -95,13 +108,14 @@ static float *find_normals(const pliant_surface *surface, const pliant_camera *c
             for (int i = 0; i < 3; i++) sums[3 * (size_t)v[k] + i] += n[i];
     }
     for (int32_t i = 0; i < surface->vertex_count; i++) {
-        const double *n = sums + 3 * (size_t)i;
+        double *n = sums + 3 * (size_t)i;
+        if (surface->normals) {
+            n[0] = (double)surface->normals[i].x;
+            n[1] = (double)surface->normals[i].y;
+            n[2] = (double)surface->normals[i].z;
+        }
         const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        if (!(length > 0)) continue;
-        const double *axis[3] = {camera->right, camera->up, camera->back};
-        for (int c = 0; c < 3; c++)
-            normals[3 * (size_t)i + c] =
-                (float)((n[0] * axis[c][0] + n[1] * axis[c][1] + n[2] * axis[c][2]) / length);
+        if (length > 0) turn_normal(camera, n, length, normals + 3 * (size_t)i);
     }
     free(sums);
     return normals;
@@ -114,7 +128,7 @@ pliant_status pliant_surface_draw(const pliant_surface *surface, const pliant_ca
     if (!normals)
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the normals of %d vertices",
                                 surface->vertex_count);
-    const material skin = make_material();
+    const material skin = make_material(surface->palette);
     for (int32_t f = 0; f < surface->face_count; f++) {
         pliant_raster_corner corner[3];
         for (int k = 0; k < 3; k++) {
@@ -126,7 +140,8 @@ pliant_status pliant_surface_draw(const pliant_surface *surface, const pliant_ca
                 .x = (float)seen[0],
                 .y = (float)seen[1],
                 .depth = (float)seen[2],
-                .attribute = {n[0], n[1], n[2], surface->value[v], (float)surface->held[v]},
+                .attribute = {n[0], n[1], n[2], surface->value ? surface->value[v] : 0,
+                              surface->held ? (float)surface->held[v] : 0},
             };
         }
         pliant_raster_triangle(raster, corner, shade, &skin);
@@ -156,11 +171,13 @@ static void blur_line(float *line, size_t stride, int32_t count, int32_t radius,
 }
 
 pliant_status pliant_surface_shade_ground(const pliant_surface *surface,
-                                          const pliant_camera *camera, double ground,
+                                          const pliant_camera *camera, const double *ground,
                                           const pliant_frame *frame, pliant_raster *raster,
                                           pliant_error *err)
 {
-    if (camera->back[2] <= 0) return PLIANT_OK;
+    const double towards =
+        ground[0] * camera->back[0] + ground[1] * camera->back[1] + ground[2] * camera->back[2];
+    if (!(towards > 0) || !(ground[2] > 0)) return PLIANT_OK;
     const int32_t width = raster->width, height = raster->height;
     const double unit = frame->width / camera->scale;  // the frame's width in lengths
     pliant_raster *mask = NULL;
@@ -177,9 +194,10 @@ pliant_status pliant_surface_shade_ground(const pliant_surface *surface,
         pliant_raster_corner corner[3];
         for (int k = 0; k < 3; k++) {
             const double *p = surface->positions + 3 * (size_t)surface->faces[3 * (size_t)f + k];
-            const double h = fmax(p[2] - ground, 0);
+            const double z = (ground[3] - ground[0] * p[0] - ground[1] * p[1]) / ground[2];
+            const double h = fmax(p[2] - z, 0);
             double seen[3];
-            pliant_camera_project(camera, (const double[3]){p[0], p[1], ground}, seen);
+            pliant_camera_project(camera, (const double[3]){p[0], p[1], z}, seen);
             // The lowest part casts the darkest shadow, so let it win.
             corner[k] =
                 (pliant_raster_corner){.x = (float)seen[0],
@@ -198,8 +216,8 @@ pliant_status pliant_surface_shade_ground(const pliant_surface *surface,
             blur_line(mask->colour + 3 * (size_t)x, 3 * (size_t)width, height, radius, scratch);
     }
     const size_t samples = (size_t)raster->samples, columns = (size_t)width * samples;
-    for (size_t y = 0; y < (size_t)height * samples; y++)
-        for (size_t x = 0; x < columns; x++) {
+    for (size_t y = (size_t)raster->top * samples; y < (size_t)raster->bottom * samples; y++)
+        for (size_t x = (size_t)raster->left * samples; x < (size_t)raster->right * samples; x++) {
             const size_t pixel = (y / samples) * (size_t)width + x / samples;
             const float light = 1 - SHADOW_STRENGTH * fminf(fmaxf(mask->colour[3 * pixel], 0), 1);
             for (size_t c = 0; c < 3; c++) raster->colour[3 * (y * columns + x) + c] *= light;

@@ -141,8 +141,11 @@ static scene make_scene(void)
         s.held[v] = z < -0.5;
         if (z > 0.5) s.u[v].z = 1;
     }
-    s.shape = (pliant_body_shape){mesh->vertex_count, mesh->face_count, mesh->vertices, mesh->faces,
-                                  s.held};
+    s.shape = (pliant_body_shape){.vertex_count = mesh->vertex_count,
+                                  .face_count = mesh->face_count,
+                                  .rest = mesh->vertices,
+                                  .faces = mesh->faces,
+                                  .held = s.held};
     return s;
 }
 
@@ -341,7 +344,7 @@ static void options_mean_what_the_help_says(void **state)
     pliant_error err = {""};
     check_ok(
         parse("a.h5 b.script -o c.png --steps 0,5,12 --sheet 2x3 --show deformed --view -30.5,40 "
-              "--size 640x480 --magnify 2.5 --range 0.01 --level 3",
+              "--size 640x480 --magnify 2.5 --range 0.01 --level 3 --region -1,-2,-3,4,5,6 --lattice",
               &o, &err),
         &err);
     assert_string_equal(o.model, "a.h5");
@@ -360,6 +363,10 @@ static void options_mean_what_the_help_says(void **state)
     check_near(o.picture.magnify, 2.5, 0);
     check_near(o.picture.range, 0.01, 0);
     assert_int_equal(o.level, 3);
+    assert_int_equal(o.picture.has_region, 1);
+    check_near(o.picture.region[2], -3, 0);
+    check_near(o.picture.region[5], 6, 0);
+    assert_int_equal(o.lattice, 1);
     check_ok(parse("--output=c.png -- -odd.h5", &o, &err), &err);
     assert_string_equal(o.model, "-odd.h5");
     assert_null(o.script);
@@ -404,6 +411,10 @@ static void bad_options_are_refused_by_name(void **state)
         {"a.h5 b -o d --magnify inf", "--magnify"},
         {"a.h5 b -o d --range 0", "--range"},
         {"a.h5 b -o d --level 16", "--level"},
+        {"a.h5 b -o d --region 0,0,0,1,1", "--region"},
+        {"a.h5 b -o d --region 0,0,0,1,1,0", "least corner first"},
+        {"a.h5 b -o d --region 0,0,0,1,1,1,1", "--region"},
+        {"a.h5 b -o d --region 0,0,0,1,1,inf", "--region"},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         pliant_draw_options options;

@@ -180,6 +180,25 @@ static void corners_that_are_nowhere_draw_nothing(void **state)
     pliant_raster_destroy(raster);
 }
 
+static void nothing_is_drawn_outside_the_window(void **state)
+{
+    (void)state;
+    pliant_raster *raster = make_raster(16, 12, 2);
+    raster->left = 3;
+    raster->right = 9;
+    raster->top = 2;
+    raster->bottom = 7;
+    const pliant_raster_corner corner[3] = {corner_at(-50, -50, 1, 0), corner_at(200, -50, 1, 0),
+                                            corner_at(-50, 200, 1, 0)};
+    pliant_raster_triangle(raster, corner, count_sample, NULL);
+    for (int row = 0; row < 24; row++)
+        for (int column = 0; column < 32; column++) {
+            const int inside = column >= 6 && column < 18 && row >= 4 && row < 14;
+            check_near((double)raster->colour[3 * (row * 32 + column)], inside, 0);
+        }
+    pliant_raster_destroy(raster);
+}
+
 static void rasters_of_no_or_enormous_size_are_refused(void **state)
 {
     (void)state;
@@ -203,6 +222,7 @@ int main(void)
         cmocka_unit_test(attributes_are_interpolated_linearly),
         cmocka_unit_test(half_covered_pixel_has_half_the_light),
         cmocka_unit_test(corners_that_are_nowhere_draw_nothing),
+        cmocka_unit_test(nothing_is_drawn_outside_the_window),
         cmocka_unit_test(rasters_of_no_or_enormous_size_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
