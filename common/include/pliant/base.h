@@ -8,9 +8,9 @@
 #include <stdint.h>
 
 #define PLIANT_VERSION_MAJOR 0
-#define PLIANT_VERSION_MINOR 2
+#define PLIANT_VERSION_MINOR 3
 #define PLIANT_VERSION_PATCH 0
-#define PLIANT_VERSION_TEXT  "0.2.0"
+#define PLIANT_VERSION_TEXT  "0.3.0"
 
 #ifdef __cplusplus
 #define PLIANT_EXTERN extern "C"
