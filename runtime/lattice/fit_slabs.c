@@ -41,6 +41,21 @@ PLIANT_INLINE void fields_of(const pliant_body *body, const pliant_rigid_field *
     }
 }
 
+// Those of the row's particles that others' regions lack, one after another; k counts them along.
+PLIANT_INLINE void list_row(const pliant_body *body, int32_t y, int32_t end, const float *rows,
+                            int32_t *k)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (; *k < end; ++*k) {
+        const int32_t *at = lattice->places + 3 * (size_t)lattice->exceptions.particle[*k];
+        if (at[1] != y) return;
+        float *to = body->listed_fits + 16 * (size_t)*k;
+        for (int f = 0; f < PLIANT_FIT_COUNT; f++)
+            to[f] = rows[f * length + PLIANT_ROW_PAD + at[0]];
+    }
+}
+
 PLIANT_INLINE void gather_bars(const pliant_body *body, const pliant_rigid_field *whole, int32_t z,
                                pliant_scratch *scratch)
 {
@@ -48,6 +63,7 @@ PLIANT_INLINE void gather_bars(const pliant_body *body, const pliant_rigid_field
     const int32_t *range = lattice->slab_rows + 2 * z, blocks = lattice->row_blocks;
     const size_t length = pliant_row_length(blocks),
                  apart = (size_t)lattice->dims[1] * PLIANT_FIT_FLOATS;
+    int32_t listed = lattice->exceptions.slab_first[z];
     for (int32_t y = range[0]; y < range[1]; y++) {
         const int32_t *block_at = lattice->block_at + ((size_t)z * lattice->dims[1] + y) * blocks;
         for (int32_t k = 0; k < blocks; k++) {
@@ -56,6 +72,7 @@ PLIANT_INLINE void gather_bars(const pliant_body *body, const pliant_rigid_field
             for (int f = 0; f < PLIANT_FIT_COUNT; f++)
                 pliant_f8_store(scratch->fit_rows + f * length + PLIANT_ROW_PAD + 8 * k, fields[f]);
         }
+        list_row(body, y, lattice->exceptions.slab_first[z + 1], scratch->fit_rows, &listed);
         float *bars = scratch->fit_bars + (size_t)y * PLIANT_FIT_FLOATS;
         for (int f = 0; f < PLIANT_FIT_COUNT; f++)
             pliant_window_along(scratch->fit_rows + f * length + PLIANT_ROW_PAD, NULL, blocks,
@@ -157,14 +174,6 @@ static void gather_restricted(const pliant_body *body, const pliant_rigid_field 
     }
 }
 
-static void gather_listed(const pliant_body *body, const pliant_rigid_field *whole, int32_t z)
-{
-    const pliant_exceptions *e = &body->lattice->exceptions;
-    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++)
-        fields_of_one(body, whole, body->lattice->slot[e->particle[k]],
-                      body->listed_fits + 16 * (size_t)k);
-}
-
 PLIANT_VECTOR_CLONES
 void pliant_fits_gather(pliant_body *body, const pliant_rigid_field *whole, int32_t z,
                         pliant_scratch *scratch)
@@ -172,7 +181,6 @@ void pliant_fits_gather(pliant_body *body, const pliant_rigid_field *whole, int3
     gather_bars(body, whole, z, scratch);
     gather_plates(body, z, scratch);
     gather_restricted(body, whole, z, scratch);
-    gather_listed(body, whole, z);
 }
 
 PLIANT_INLINE float *mean_rows(const pliant_lattice *lattice, pliant_scratch *scratch, int32_t y,

@@ -40,6 +40,20 @@ static int32_t row_is_empty(const pliant_lattice *lattice, int32_t y, int32_t z)
     return 1;
 }
 
+// Those of the row's particles that others' regions lack, one after another; k counts them along.
+PLIANT_INLINE void list_row(const pliant_body *body, int32_t y, int32_t end, const float *rows,
+                            int32_t *k)
+{
+    const pliant_lattice *lattice = body->lattice;
+    const size_t length = pliant_row_length(lattice->row_blocks);
+    for (; *k < end; ++*k) {
+        const int32_t *at = lattice->places + 3 * (size_t)lattice->exceptions.particle[*k];
+        if (at[1] != y) return;
+        float *to = body->weighed + 4 * (size_t)*k;
+        for (int c = 0; c < 3; c++) to[c] = rows[c * length + PLIANT_ROW_PAD + at[0]];
+    }
+}
+
 // Bars (LSM-4, 5): sums and moments along x, shape [row_blocks][dims y][6][8].
 PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
@@ -47,6 +61,7 @@ PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *
     const int32_t *range = lattice->slab_rows + 2 * z;
     const size_t length = pliant_row_length(lattice->row_blocks);
     const size_t apart = (size_t)lattice->dims[1] * 6 * PLIANT_LANES;
+    int32_t listed = lattice->exceptions.slab_first[z];
     for (int32_t y = range[0]; y < range[1]; y++) {
         float *bars = scratch->bars + (size_t)y * 6 * PLIANT_LANES;
         if (row_is_empty(lattice, y, z)) {
@@ -55,6 +70,7 @@ PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *
             continue;
         }
         load_row(body, y, z, scratch->rows);
+        list_row(body, y, lattice->exceptions.slab_first[z + 1], scratch->rows, &listed);
         for (int c = 0; c < 3; c++)
             pliant_window_along(scratch->rows + c * length + PLIANT_ROW_PAD, NULL,
                                 lattice->row_blocks, lattice->half_width, scratch->doubled,
@@ -143,28 +159,12 @@ static void sum_restricted(pliant_body *body, int32_t z, const pliant_scratch *s
     }
 }
 
-// The slab's particles that others' regions may lack.
-static void weigh_listed(pliant_body *body, int32_t z)
-{
-    const pliant_exceptions *e = &body->lattice->exceptions;
-    for (int32_t k = e->slab_first[z]; k < e->slab_first[z + 1]; k++) {
-        const int32_t slot = body->lattice->slot[e->particle[k]];
-        const int32_t block = slot / (3 * PLIANT_LANES);
-        const float share =
-            body->particle_constants[body->particle_constants_of[block]].share[slot % PLIANT_LANES];
-        float *to = body->weighed + 4 * (size_t)k;
-        for (int c = 0; c < 3; c++)
-            to[c] = share * (body->x[slot + PLIANT_LANES * c] - body->origin[c]);
-    }
-}
-
 PLIANT_VECTOR_CLONES
 void pliant_plates_gather(pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     sum_bars(body, z, scratch);
     sum_plates(body, z, scratch);
     sum_restricted(body, z, scratch);
-    weigh_listed(body, z);
 }
 
 // ---- Back ----
