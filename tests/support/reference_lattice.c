@@ -195,11 +195,20 @@ void reference_lattice_destroy(reference_lattice *l)
     for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) free(blocks[i]);
 }
 
+// The order of particles: by (z, y, x).
+static int compare_places(const void *a, const void *b)
+{
+    const int32_t *p = a, *q = b;
+    for (int c = 2; c >= 0; c--)
+        if (p[c] != q[c]) return p[c] < q[c] ? -1 : 1;
+    return 0;
+}
+
 int32_t reference_lattice_find(const reference_lattice *l, const int32_t place[3])
 {
-    for (int32_t i = 0; i < l->particle_count; i++)
-        if (!memcmp(l->particles + 3 * i, place, 3 * sizeof *place)) return i;
-    return -1;
+    const int32_t *found = bsearch(place, l->particles, (size_t)l->particle_count,
+                                   3 * sizeof *l->particles, compare_places);
+    return found ? (int32_t)((found - l->particles) / 3) : -1;
 }
 
 static int32_t link_of(const reference_lattice *l, int32_t i, int32_t j)
