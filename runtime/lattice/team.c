@@ -3,7 +3,9 @@
 // `remaining` says all: a worker takes a task by counting it down, and may read what the run is
 // about only after that, since no run ends before the tasks that were taken from it. So a worker
 // that wakes late takes part in whatever run is on by then, and a run never waits for one that is
-// still asleep.
+// still asleep. Which task it is comes after: every worker has a stretch of the tasks, the same in
+// every run of as many, so that what they work on stays in its caches; one that is through with its
+// own takes the next of another's.
 #include "lattice/team.h"
 
 #include "lattice/float_mode.h"
@@ -25,6 +27,12 @@ typedef struct member {
     pthread_t thread;
 } member;
 
+// A worker's own tasks: next .. end - 1.
+typedef struct stretch {
+    _Alignas(64) atomic_int next;
+    int32_t end;
+} stretch;
+
 struct pliant_team {
     int32_t thread_count, started;  // threads beside the caller: 0 .. thread_count - 1 of them
     int spin_count;
@@ -34,6 +42,7 @@ struct pliant_team {
     int32_t task_count;
     pliant_float_mode mode;
     _Alignas(64) atomic_int remaining;  // tasks that nobody has taken
+    stretch stretches[PLIANT_TEAM_LIMIT];
     _Alignas(64) atomic_int finished;
     _Alignas(64) atomic_int sleeper_count;
     atomic_int is_caller_asleep, is_over;
@@ -50,19 +59,26 @@ static void relax(void)
 }
 
 // Take a task: its number, or -1 when none is left.
-static int32_t take(pliant_team *team)
+static int32_t take(pliant_team *team, int32_t worker)
 {
     int left = atomic_load_explicit(&team->remaining, memory_order_relaxed);
     while (left > 0)
         if (atomic_compare_exchange_weak_explicit(&team->remaining, &left, left - 1,
-                                                  memory_order_acquire, memory_order_relaxed))
-            return team->task_count - left;
+                                                  memory_order_acquire, memory_order_relaxed)) {
+            // There are as many tasks in the stretches as were counted, so this ends.
+            for (int32_t k = worker;; k = k + 1 < team->thread_count ? k + 1 : 0) {
+                stretch *s = &team->stretches[k];
+                if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) continue;
+                const int32_t task = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
+                if (task < s->end) return task;
+            }
+        }
     return -1;
 }
 
 static void work(pliant_team *team, int32_t worker)
 {
-    for (int32_t task = take(team); task >= 0; task = take(team)) {
+    for (int32_t task = take(team, worker); task >= 0; task = take(team, worker)) {
         const int32_t task_count = team->task_count;
         if (pliant_float_mode_get() != team->mode) pliant_float_mode_set(team->mode);
         team->task(team->context, task, worker);
@@ -170,6 +186,12 @@ void pliant_team_run(pliant_team *team, int32_t task_count, pliant_task *task, v
     team->context = context;
     team->task_count = task_count;
     team->mode = pliant_float_mode_get();
+    for (int32_t k = 0; k < team->thread_count; k++) {
+        const int64_t count = task_count;
+        atomic_store_explicit(&team->stretches[k].next, (int)(count * k / team->thread_count),
+                              memory_order_relaxed);
+        team->stretches[k].end = (int32_t)(count * (k + 1) / team->thread_count);
+    }
     atomic_store_explicit(&team->finished, 0, memory_order_relaxed);
     atomic_store(&team->remaining, task_count);
     if (atomic_load(&team->sleeper_count) > 0) {

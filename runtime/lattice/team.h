@@ -1,10 +1,10 @@
 // team.h: a few threads that share the tasks of one caller.
 //
 // A team is created once; its threads then wait for work, spinning for some microseconds and
-// asleep after that. A run hands out tasks 0 .. task_count - 1 in ascending order, each to whoever
-// is free; the caller works along as worker 0. What comes out must not depend on who did what: a
-// task writes what no other task of its run reads or writes, `worker` is for scratch memory. Tasks
-// run in the caller's floating-point mode.
+// asleep after that. A run hands out tasks 0 .. task_count - 1, to each thread from a stretch of
+// its own, then from others'; the caller works along as worker 0. What comes out must not depend on
+// who did what: a task writes what no other task of its run reads or writes, `worker` is for
+// scratch memory. Tasks run in the caller's floating-point mode.
 //
 // One caller at a time, and no run within a run. A run allocates nothing; it takes the team's lock
 // only to wake sleepers or to sleep.
