@@ -26,10 +26,12 @@ static const double spool_floor = 1e-8;
 struct pliant_compression {
     const pliant_wavelet *wavelet;
     pliant_compression_def def;
-    pliant_spool *spool;      // NULL: none; targets have one
-    double *nodal;            // [m + 1][entries][group], the caller's
-    double *error;            // the same; the paper's rule only
-    pliant_spooled scratch;   // a column on its way to the spool: room for m blocks; with a spool only
+    pliant_spool *spool;    // NULL: none; targets have one
+    pliant_spool *decided;  // what the paper's rule keeps, for a later run; may be NULL
+    double *nodal;          // [m + 1][entries][group], the caller's
+    double *error;          // the same; the paper's rule only
+    pliant_spooled
+        scratch;  // a column on its way to the spool: room for m blocks; with a spool only
     pliant_kept_set kept;
     double exact_energy;      // sum over this rank's columns of |xi_j|^2
     double error_energy;      // the same of the stored columns' errors
@@ -41,27 +43,40 @@ static pliant_status no_memory(pliant_error *err)
     return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for compressed columns");
 }
 
-pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
-                                        const pliant_compression_def *def, const char *folder,
-                                        pliant_compression **compression, pliant_error *err)
+// Everything but the spools.
+static pliant_status create(const pliant_wavelet *wavelet, const pliant_compression_def *def,
+                            pliant_compression **compression, pliant_error *err)
 {
     pliant_compression *c = calloc(1, sizeof *c);
+    *compression = c;
     if (!c) return no_memory(err);
     c->wavelet = wavelet;
     c->def = *def;
     const size_t rows = (size_t)wavelet->count + 1;
-    pliant_status status = PLIANT_OK;
     c->nodal = calloc(rows * width, sizeof *c->nodal);
-    if (!c->nodal) status = no_memory(err);
-    if (def->eps > 0) {
-        c->error = calloc(rows * width, sizeof *c->error);
-        if (!c->error) status = no_memory(err);
-    }
-    if (folder && status == PLIANT_OK) {
-        c->scratch.rows = calloc(rows, sizeof *c->scratch.rows);
-        c->scratch.norms = calloc(rows, sizeof *c->scratch.norms);
-        c->scratch.blocks = calloc(rows * entries, sizeof *c->scratch.blocks);
-        if (!c->scratch.rows || !c->scratch.norms || !c->scratch.blocks) status = no_memory(err);
+    if (!c->nodal) return no_memory(err);
+    if (def->eps > 0) c->error = calloc(rows * width, sizeof *c->error);
+    return def->eps > 0 && !c->error ? no_memory(err) : PLIANT_OK;
+}
+
+// Room for a column on its way to the spool.
+static pliant_status create_scratch(pliant_compression *c, pliant_error *err)
+{
+    const size_t rows = (size_t)c->wavelet->count + 1;
+    c->scratch.rows = calloc(rows, sizeof *c->scratch.rows);
+    c->scratch.norms = calloc(rows, sizeof *c->scratch.norms);
+    c->scratch.blocks = calloc(rows * entries, sizeof *c->scratch.blocks);
+    return !c->scratch.rows || !c->scratch.norms || !c->scratch.blocks ? no_memory(err) : PLIANT_OK;
+}
+
+pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
+                                        const pliant_compression_def *def, const char *folder,
+                                        pliant_compression **compression, pliant_error *err)
+{
+    pliant_compression *c;
+    pliant_status status = create(wavelet, def, &c, err);
+    if (status == PLIANT_OK && folder) {
+        status = create_scratch(c, err);
         if (status == PLIANT_OK) status = pliant_spool_create(folder, &c->spool, err);
     }
     if (status < 0) {
@@ -72,15 +87,67 @@ pliant_status pliant_compression_create(const pliant_wavelet *wavelet,
     return PLIANT_OK;
 }
 
+void pliant_compression_streams(const pliant_compression_def *def, pliant_compression_use use,
+                                int streams[2])
+{
+    streams[0] = def->eps == 0 || use == PLIANT_COMPRESSION_REFINED;
+    streams[1] = def->eps > 0;
+}
+
+pliant_status pliant_compression_create_in(const pliant_wavelet *wavelet,
+                                           const pliant_compression_def *def,
+                                           pliant_compression_use use, pliant_column_file *file,
+                                           const int32_t streams[2],
+                                           pliant_compression **compression, pliant_error *err)
+{
+    pliant_compression *c;
+    int used[2];
+    pliant_compression_streams(def, use, used);
+    pliant_status status = create(wavelet, def, &c, err);
+    if (status == PLIANT_OK && used[0]) {
+        status = create_scratch(c, err);
+        if (status == PLIANT_OK) status = pliant_spool_create_in(file, streams[0], &c->spool, err);
+    }
+    if (status == PLIANT_OK && used[1])
+        status = pliant_spool_create_in(file, streams[1], &c->decided, err);
+    if (status < 0) {
+        pliant_compression_destroy(c);
+        return status;
+    }
+    *compression = c;
+    return PLIANT_OK;
+}
+
+pliant_status pliant_compression_restore(pliant_compression *c, const pliant_spooled *spooled,
+                                         const pliant_spooled *kept, pliant_error *err)
+{
+    if (c->spool) {
+        const pliant_status status = pliant_spool_adopt(c->spool, spooled, err);
+        if (status < 0) return status;
+    }
+    c->exact_energy += c->decided ? kept->energy : spooled->energy;
+    if (!c->decided) return PLIANT_OK;
+    pliant_status status = pliant_kept_set_begin(&c->kept, kept->column, err);
+    for (int32_t i = 0; i < kept->count && status == PLIANT_OK; i++) {
+        double block[entries];
+        for (int e = 0; e < entries; e++) block[e] = kept->blocks[entries * (size_t)i + e];
+        status = pliant_kept_set_add(&c->kept, kept->rows[i], block, err);
+    }
+    c->error_energy += kept->error_energy;
+    c->worst = fmax(c->worst, kept->error_worst);
+    return status;
+}
+
 void pliant_compression_settle(pliant_compression *c)
 {
+    pliant_spool_destroy(c->decided);
     pliant_spool_destroy(c->spool);
     free((void *)(uintptr_t)c->scratch.blocks);
     free((void *)(uintptr_t)c->scratch.norms);
     free((void *)(uintptr_t)c->scratch.rows);
     free(c->error);
     free(c->nodal);
-    c->spool = NULL;
+    c->spool = c->decided = NULL;
     c->scratch = (pliant_spooled){.count = 0};
     c->error = c->nodal = NULL;
 }
@@ -121,7 +188,8 @@ static void measure(const double *x, int32_t rows, double *largest, double *sum)
 // GF-31..33: drop the block (i, j), i on level l >= 1, when |xi~_ij|_F < 2^(l-L) eps max_i |xi_ij|_F.
 // c->nodal holds the coefficients; c->error becomes nodal values - W^-1 (what is kept, rounded).
 static pliant_status keep_by_level(pliant_compression *c, const int32_t *columns, int32_t count,
-                                   const double *peak_square, pliant_error *err)
+                                   const double *peak_square, const double *energy,
+                                   pliant_error *err)
 {
     const pliant_wavelet *w = c->wavelet;
     const int32_t finest = w->level_count - 1;
@@ -147,8 +215,25 @@ static pliant_status keep_by_level(pliant_compression *c, const int32_t *columns
     double largest[group], sum[group];
     measure(c->error, w->count, largest, sum);
     for (int32_t k = 0; k < count; k++) {
+        const double worst = peak_square[k] > 0 ? sqrt(largest[k] / peak_square[k]) : 0;
         c->error_energy += sum[k];
-        if (peak_square[k] > 0) c->worst = fmax(c->worst, sqrt(largest[k] / peak_square[k]));
+        c->worst = fmax(c->worst, worst);
+        if (!c->decided) continue;
+        const int32_t index = c->kept.column_count - count + k;
+        const uint64_t begin = c->kept.offset[index];
+        const float *blocks = c->kept.blocks + begin * entries;
+        // Nobody reads the norms of what is decided on: any numbers will do.
+        const pliant_spooled column = {.column = columns[k],
+                                       .count = (int32_t)(c->kept.offset[index + 1] - begin),
+                                       .rows = c->kept.rows + begin,
+                                       .norms = blocks,
+                                       .blocks = blocks,
+                                       .peak = sqrt(peak_square[k]),
+                                       .energy = energy[k],
+                                       .error_energy = sum[k],
+                                       .error_worst = worst};
+        const pliant_status status = pliant_spool_append(c->decided, &column, err);
+        if (status < 0) return status;
     }
     return PLIANT_OK;
 }
@@ -190,8 +275,9 @@ pliant_status pliant_compression_add(pliant_compression *c, const int32_t *colum
     for (int32_t k = 0; k < count; k++) c->exact_energy += energy[k];
     pliant_wavelet_forward(c->wavelet, width, c->nodal);
     pliant_status status = PLIANT_OK;
-    if (c->def.eps > 0) status = keep_by_level(c, columns, count, peak_square, err);
-    if (c->spool && status == PLIANT_OK) status = spool_group(c, columns, count, peak_square, energy, err);
+    if (c->def.eps > 0) status = keep_by_level(c, columns, count, peak_square, energy, err);
+    if (c->spool && status == PLIANT_OK)
+        status = spool_group(c, columns, count, peak_square, energy, err);
     return status;
 }
 

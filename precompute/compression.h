@@ -36,10 +36,31 @@ PLIANT_UNUSED_RESULT pliant_status pliant_compression_create(const pliant_wavele
                                                              const char *folder,
                                                              pliant_compression **compression,
                                                              pliant_error *err);
+// The same with columns in `file` (borrowed until settle), so that a later run can go on: what a
+// search or refinement reads in one of its streams, what the paper's rule keeps in another. `use`
+// says whether coarser levels will be refined from these columns.
+typedef enum pliant_compression_use {
+    PLIANT_COMPRESSION_ALONE,
+    PLIANT_COMPRESSION_REFINED
+} pliant_compression_use;
+PLIANT_UNUSED_RESULT pliant_status pliant_compression_create_in(
+    const pliant_wavelet *wavelet, const pliant_compression_def *def, pliant_compression_use use,
+    pliant_column_file *file, const int32_t streams[2], pliant_compression **compression,
+    pliant_error *err);
 void pliant_compression_destroy(pliant_compression *compression);  // NULL is fine
 
-// Where the caller puts the next group's nodal values: shape [m + 1][3][3][PLIANT_COLUMN_GROUP], entry
-// [i][r][c][k] the component r at row node i due to component c of the k-th column. Borrowed.
+// Streams that a column goes to, [0] what is read later, [1] what is kept: 1 or 0.
+void pliant_compression_streams(const pliant_compression_def *def, pliant_compression_use use,
+                                int streams[2]);
+// Take in a column from an earlier run: from either stream, NULL where there is none; borrowed
+// until destroy. Columns come in the order in which they would have been added.
+PLIANT_UNUSED_RESULT pliant_status pliant_compression_restore(pliant_compression *compression,
+                                                              const pliant_spooled *spooled,
+                                                              const pliant_spooled *kept,
+                                                              pliant_error *err);
+
+// Where the caller puts the next group's nodal values: shape [m + 1][3][3][PLIANT_COLUMN_GROUP],
+// entry [i][r][c][k] the component r at row node i due to component c of the k-th column. Borrowed.
 double *pliant_compression_group(pliant_compression *compression);
 // Transform, threshold and spool the group's first `count` columns, named by column position.
 PLIANT_UNUSED_RESULT pliant_status pliant_compression_add(pliant_compression *compression,

@@ -4,6 +4,7 @@
 // whole columns. Xi as a whole never exists.
 #include "greens.h"
 
+#include "interruption.h"
 #include "refinement.h"
 #include "refusal.h"
 #include "right_hand.h"
@@ -27,7 +28,12 @@ int32_t pliant_greens_batch(MPI_Comm comm)
     PetscMPIInt size = 1;
     (void)MPI_Comm_size(comm, &size);
     const int64_t batch = (int64_t)batch_per_rank * size;
-    return (int32_t)(batch < least_batch ? least_batch : batch > largest_batch ? largest_batch : batch);
+    // PETSC_OPTIONS="-pliant_batch N" overrules.
+    PetscInt chosen = (PetscInt)(batch < least_batch     ? least_batch
+                                 : batch > largest_batch ? largest_batch
+                                                         : batch);
+    (void)PetscOptionsGetInt(NULL, NULL, "-pliant_batch", &chosen, NULL);
+    return chosen < 1 ? 1 : chosen > INT16_MAX ? INT16_MAX : (int32_t)chosen;
 }
 
 void pliant_greens_share(const pliant_greens *greens, int32_t column_count, int32_t first, int rank,
@@ -53,19 +59,100 @@ int32_t pliant_greens_column_count(const pliant_problem *p, pliant_block_name bl
     return (pliant_greens_free_columns(block) ? p->free_hats : p->fixed_hats)->level_offset[level + 1];
 }
 
+static pliant_compression_use use_of(const pliant_problem *p, int32_t level)
+{
+    return level > p->levels.first ? PLIANT_COMPRESSION_REFINED : PLIANT_COMPRESSION_ALONE;
+}
+
 // A compressor for one level. Coarser levels are refined from its spool.
 static pliant_status create_level(pliant_greens *g, pliant_block_name block, int32_t level, pliant_error *err)
 {
     const pliant_problem *p = g->problem;
-    const int needs_spool = g->compression.eps == 0 || level > p->levels.first;
-    return pliant_compression_create(pliant_greens_free_rows(block) ? p->free_wavelet : p->fixed_wavelet,
-                                     &g->compression, needs_spool ? g->folder : NULL,
+    const pliant_wavelet *wavelet =
+        pliant_greens_free_rows(block) ? p->free_wavelet : p->fixed_wavelet;
+    const pliant_compression_use use = use_of(p, level);
+    int needs[2];
+    if (g->partial && level == p->levels.last) {
+        const int32_t streams[2] = {2 * block, 2 * block + 1};
+        return pliant_compression_create_in(wavelet, &g->compression, use,
+                                            pliant_partial_file(g->partial), streams,
+                                            &g->blocks[block][level], err);
+    }
+    pliant_compression_streams(&g->compression, use, needs);
+    return pliant_compression_create(wavelet, &g->compression, needs[0] ? g->folder : NULL,
                                      &g->blocks[block][level], err);
+}
+
+void pliant_greens_streams(const pliant_problem *problem, const pliant_options *options,
+                           int32_t domain[PLIANT_PARTIAL_STREAMS])
+{
+    int used[2];
+    pliant_compression_streams(&options->compression, use_of(problem, problem->levels.last), used);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int k = 0; k < 2; k++) {
+            const int is_asked = b == PLIANT_FREE_FREE || options->blocks == PLIANT_BLOCKS_ALL;
+            const int is_free = pliant_greens_free_columns((pliant_block_name)b);
+            domain[2 * b + k] = !is_asked || !used[k] ? -1
+                                : is_free             ? PLIANT_COLUMNS_FREE
+                                                      : PLIANT_COLUMNS_FIXED;
+        }
+}
+
+// This rank's columns of a block from what an earlier run has left, in the order of solving.
+static pliant_status restore_block(pliant_greens *g, pliant_block_name block, int rank, int size,
+                                   pliant_error *err)
+{
+    const int32_t level = g->problem->levels.last;
+    const pliant_column_domain domain =
+        pliant_greens_free_columns(block) ? PLIANT_COLUMNS_FREE : PLIANT_COLUMNS_FIXED;
+    const int32_t count = pliant_greens_column_count(g->problem, block, level);
+    const int32_t done = pliant_partial_done(g->partial, domain);
+    for (int32_t first = 0; first < done; first += g->batch) {
+        int32_t begin, end;
+        pliant_greens_share(g, count, first, rank, size, &begin, &end);
+        for (int32_t column = begin; column < end; column++) {
+            pliant_spooled spooled, kept;
+            const int is_spooled = pliant_partial_find(g->partial, 2 * block, column, &spooled);
+            const int is_kept = pliant_partial_find(g->partial, 2 * block + 1, column, &kept);
+            const pliant_status status = pliant_compression_restore(
+                g->blocks[block][level], is_spooled ? &spooled : NULL, is_kept ? &kept : NULL, err);
+            if (status < 0) return status;
+        }
+    }
+    return PLIANT_OK;
+}
+
+// Collective.
+static PetscErrorCode restore(pliant_greens *g, pliant_error *err)
+{
+    PetscFunctionBegin;
+    PetscMPIInt rank, size;
+    PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
+    PetscCallMPI(MPI_Comm_size(g->comm, &size));
+    g->residual = pliant_partial_residual(g->partial);
+    pliant_status status = PLIANT_OK;
+    for (int b = 0; b < PLIANT_BLOCK_COUNT && status == PLIANT_OK; b++)
+        if (g->blocks[b][g->problem->levels.last])
+            status = restore_block(g, (pliant_block_name)b, rank, size, err);
+    PliantCall(g->comm, status, err);
+
+    const size_t free_size = 9 * (size_t)g->problem->free_count,
+                 fixed_size = 9 * (size_t)g->problem->fixed_count;
+    float *gravity;
+    PetscCall(PetscMalloc1(free_size + fixed_size, &gravity));
+    g->has_gravity = pliant_partial_gravity(g->partial, gravity, free_size + fixed_size);
+    if (g->has_gravity) {
+        memcpy(g->gravity_free, gravity, free_size * sizeof *gravity);
+        memcpy(g->gravity_fixed, gravity + free_size, fixed_size * sizeof *gravity);
+    }
+    PetscCall(PetscFree(gravity));
+    PetscFunctionReturn(0);
 }
 
 PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
                                     const pliant_options *options, const char *folder,
-                                    pliant_greens **greens, pliant_error *err)
+                                    pliant_partial *partial, pliant_greens **greens,
+                                    pliant_error *err)
 {
     PetscFunctionBegin;
     pliant_greens *g;
@@ -75,6 +162,8 @@ PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem
     g->problem = problem;
     g->compression = options->compression;
     g->folder = folder;
+    g->partial = partial;
+    if (partial) PetscCall(pliant_partial_begin(partial, err));
     g->batch = pliant_greens_batch(comm);
     pliant_status status = PLIANT_OK;
     for (int b = 0; b < PLIANT_BLOCK_COUNT && status == PLIANT_OK; b++)
@@ -85,6 +174,7 @@ PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem
     if (status == PLIANT_OK && (!g->gravity_free || !g->gravity_fixed))
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the gravity columns");
     PliantCall(comm, status, err);
+    if (partial) PetscCall(restore(g, err));
     PetscFunctionReturn(0);
 }
 
@@ -173,7 +263,9 @@ static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system
     const pliant_problem *p = g->problem;
     const pliant_hats *hats = fixed_columns ? p->fixed_hats : p->free_hats;
     const int32_t columns = hats->level_offset[p->levels.last + 1];
-    for (int32_t first = 0; first < columns; first += g->batch) {
+    const pliant_column_domain domain = fixed_columns ? PLIANT_COLUMNS_FIXED : PLIANT_COLUMNS_FREE;
+    for (int32_t first = g->partial ? pliant_partial_done(g->partial, domain) : 0; first < columns;
+         first += g->batch) {
         const int32_t count = columns - first < g->batch ? columns - first : g->batch;
         pliant_dense_share share;
         const double begin = pliant_progress_clock();
@@ -188,8 +280,12 @@ static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system
             g->residual = fmax(g->residual, sample_residual(sample, p->vertex_count, before + position,
                                                             share.columns, share.ld));
         if (dense)
-            PetscCall(pliant_dense_output_add(dense, fixed_columns ? PLIANT_DENSE_FIXED : PLIANT_DENSE_FREE,
-                                              position, mine, share.columns, share.ld, err));
+            PetscCall(pliant_dense_output_add(
+                dense, fixed_columns ? PLIANT_DENSE_FIXED : PLIANT_DENSE_FREE, position, mine,
+                share.columns, share.ld, err));
+        if (g->partial)
+            PetscCall(pliant_partial_advance(g->partial, domain, first + count, g->residual, err));
+        else PliantCall(g->comm, pliant_interruption_check(err), err);
         g->transform_seconds += pliant_progress_clock() - solved;
         pliant_progress_update(progress, before + first + count);
     }
@@ -234,7 +330,17 @@ static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *syste
     PetscCallMPI(MPI_Bcast(g->gravity_free, 9 * p->free_count, MPI_FLOAT, owner, g->comm));
     PetscCallMPI(MPI_Bcast(g->gravity_fixed, 9 * p->fixed_count, MPI_FLOAT, owner, g->comm));
     if (dense)
-        PetscCall(pliant_dense_output_add(dense, PLIANT_DENSE_GRAVITY, 0, mine, share.columns, share.ld, err));
+        PetscCall(pliant_dense_output_add(dense, PLIANT_DENSE_GRAVITY, 0, mine, share.columns,
+                                          share.ld, err));
+    if (g->partial) {
+        const size_t free_size = 9 * (size_t)p->free_count, fixed_size = 9 * (size_t)p->fixed_count;
+        float *gravity;
+        PetscCall(PetscMalloc1(free_size + fixed_size, &gravity));
+        memcpy(gravity, g->gravity_free, free_size * sizeof *gravity);
+        memcpy(gravity + free_size, g->gravity_fixed, fixed_size * sizeof *gravity);
+        PetscCall(pliant_partial_store_gravity(g->partial, gravity, free_size + fixed_size, err));
+        PetscCall(PetscFree(gravity));
+    }
     PetscFunctionReturn(0);
 }
 
@@ -246,11 +352,15 @@ PetscErrorCode pliant_greens_solve(pliant_greens *g, pliant_dense_system *system
     const int32_t level = g->problem->levels.last;
     const int all = g->blocks[PLIANT_FIXED_FIXED][level] != NULL;
     const int32_t free_columns = g->problem->free_hats->level_offset[level + 1];
-    pliant_progress_begin(progress, "solve",
-                          pliant_right_hand_count(g->problem, all ? PLIANT_BLOCKS_ALL : PLIANT_BLOCKS_FREE));
+    int32_t done = 0;
+    for (int d = 0; g->partial && d < PLIANT_COLUMN_DOMAINS; d++)
+        done += pliant_partial_done(g->partial, (pliant_column_domain)d);
+    pliant_progress_begin_at(
+        progress, "solve", done,
+        pliant_right_hand_count(g->problem, all ? PLIANT_BLOCKS_ALL : PLIANT_BLOCKS_FREE));
     PetscCall(solve_domain(g, system, 0, 0, sample, dense, progress, err));
     if (all) PetscCall(solve_domain(g, system, 1, free_columns, sample, dense, progress, err));
-    PetscCall(solve_gravity(g, system, dense, err));
+    if (!g->has_gravity) PetscCall(solve_gravity(g, system, dense, err));
     double worst;
     PetscCallMPI(MPI_Allreduce(&g->residual, &worst, 1, MPI_DOUBLE, MPI_MAX, g->comm));
     g->residual = worst;
@@ -294,10 +404,16 @@ static PetscErrorCode measure_definiteness(pliant_greens *g, int32_t level, plia
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_error *err)
+PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_progress *progress,
+                                      pliant_error *err)
 {
     PetscFunctionBegin;
     const pliant_level_range levels = g->problem->levels;
+    int64_t total = 0, done = 0;  // columns of all levels
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = levels.first; g->blocks[b][levels.last] && l <= levels.last; l++)
+            total += pliant_greens_column_count(g->problem, (pliant_block_name)b, l);
+    pliant_progress_begin(progress, "compress", total);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++) {
         const pliant_block_name block = (pliant_block_name)b;
         if (!g->blocks[b][levels.last]) continue;
@@ -310,6 +426,8 @@ PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_error *err)
             }
             pliant_compression_settle(fine);
             if (block == PLIANT_FREE_FREE) PetscCall(measure_definiteness(g, l, err));
+            done += pliant_greens_column_count(g->problem, block, l);
+            pliant_progress_update(progress, done);
         }
     }
     PetscFunctionReturn(0);

@@ -5,6 +5,7 @@
 #include "compression.h"
 #include "dense_system.h"
 #include "dense_output.h"
+#include "partial.h"
 #include "problem.h"
 
 #include "pliant/sections.h"
@@ -20,12 +21,15 @@ typedef struct pliant_greens {
     MPI_Comm comm;
     const pliant_problem *problem;
     pliant_compression_def compression;
-    const char *folder;  // of spools; borrowed until compress
-    int32_t batch;       // columns solved for at once
-    // By block and level; NULL where not asked for, or not yet there: coarser levels come with compress.
+    const char *folder;       // of spools; borrowed until compress
+    pliant_partial *partial;  // where solved columns wait; NULL: in spools that go with the run
+    int32_t batch;            // columns solved for at once
+    // By block and level; NULL where not asked for, or not yet there: coarser levels come with
+    // compress.
     pliant_compression *blocks[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
     pliant_greens_result results[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
     float *gravity_free, *gravity_fixed;  // [m][3][3], [k][3][3]: wavelet coefficients; all ranks
+    int has_gravity;                      // 1: they are an earlier run's
     double residual;                      // largest backward error of sampled rows and columns
     double solve_seconds, transform_seconds;
 } pliant_greens;
@@ -39,10 +43,17 @@ int pliant_greens_free_columns(pliant_block_name block);
 // Columns of a block's level.
 int32_t pliant_greens_column_count(const pliant_problem *problem, pliant_block_name block, int32_t level);
 
-// Collective: compressors for the blocks asked for, with spools in `folder` (borrowed until compress).
+// The streams of `partial` and their domains.
+void pliant_greens_streams(const pliant_problem *problem, const pliant_options *options,
+                           int32_t domain[PLIANT_PARTIAL_STREAMS]);
+
+// Collective: compressors for the blocks asked for, with spools in `folder` (borrowed until
+// compress). Solved columns go to `partial` (borrowed until destroy, may be NULL), and what is in
+// it is taken in.
 PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
                                     const pliant_options *options, const char *folder,
-                                    pliant_greens **greens, pliant_error *err);
+                                    pliant_partial *partial, pliant_greens **greens,
+                                    pliant_error *err);
 PetscErrorCode pliant_greens_destroy(pliant_greens **greens);
 
 // A row of the system kept from before the factorization, against which solutions are tested.
@@ -52,12 +63,14 @@ typedef struct pliant_sample_row {
     double *right;   // [3 columns][3]: the right-hand sides' rows
 } pliant_sample_row;
 
-// Collective: solve the columns of the finest level asked for. `dense` may be NULL.
+// Collective: solve those columns of the finest level asked for that are not there yet. `dense` may
+// be NULL, and `system` when the partial data is whole.
 PetscErrorCode pliant_greens_solve(pliant_greens *greens, pliant_dense_system *system,
                                    const pliant_sample_row *sample, pliant_dense_output *dense,
                                    pliant_progress *progress, pliant_error *err);
 // Collective: choose what is kept, level by level: each coarser one refined from the next finer.
-PetscErrorCode pliant_greens_compress(pliant_greens *greens, pliant_error *err);
+PetscErrorCode pliant_greens_compress(pliant_greens *greens, pliant_progress *progress,
+                                      pliant_error *err);
 
 // The batches of a level's columns, the same on every rank and when they are written.
 // This rank's share of the batch that begins at position `first`.

@@ -1,4 +1,5 @@
 // main.c: pliant-precompute: from a mesh to a file of compressed Green's functions.
+#include "interruption.h"
 #include "options.h"
 #include "refusal.h"
 #include "run.h"
@@ -188,11 +189,18 @@ static int run(int argc, char **argv, int rank)
                                            &progress, &summary, &err);
     free(command_line);
     if (code != 0 && code != PLIANT_REFUSED) MPI_Abort(PETSC_COMM_WORLD, EXIT_FAILED);
-    if (rank > 0) return !code ? EXIT_DONE : summary.misused ? EXIT_MISUSED : EXIT_FAILED;
+    const int failed = summary.signal    ? 128 + summary.signal
+                       : summary.misused ? EXIT_MISUSED
+                                         : EXIT_FAILED;
+    if (rank > 0) return code ? failed : EXIT_DONE;
     if (code) {
         (void)pliant_progress_end(&progress);
         fprintf(stderr, "%s: %s\n", program, err.text);
-        return summary.misused ? EXIT_MISUSED : EXIT_FAILED;
+        return failed;
+    }
+    if (summary.was_finished) {
+        pliant_progress_note(&progress, "%s: was finished already", options.output);
+        return EXIT_DONE;
     }
     if (options.reporting == PLIANT_REPORT_JSON) print_json(&options, &summary);
     else if (options.talk == PLIANT_TALK_PROGRESS) print_text(&options, &summary);
@@ -210,6 +218,8 @@ int main(int argc, char **argv)
     if (pliant_refusal_install()) return EXIT_FAILED;
     int rank = 0;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    pliant_interruption_install(rank == 0 ? program : NULL);
+    pliant_interruption_at_once("nothing is kept", NULL, NULL);
     const int status = run(argc, argv, rank);
     PetscFinalize();
     return status;

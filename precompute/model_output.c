@@ -4,6 +4,7 @@
 // each other by rank, as they were dealt out.
 #include "model_output.h"
 
+#include "interruption.h"
 #include "refusal.h"
 
 #include "pliant/error.h"
@@ -57,8 +58,9 @@ static PetscErrorCode reserve(parcel *p, uint64_t count)
 }
 
 // Collective: bring the columns of a block's level to the first rank and write them.
-static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g, pliant_block_name block,
-                                  int32_t level, const uint64_t *offset, pliant_error *err)
+static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g,
+                                    pliant_block_name block, int32_t level, const uint64_t *offset,
+                                    int64_t written, pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
     PetscMPIInt rank, size;
@@ -103,7 +105,15 @@ static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g, pli
         int32_t begin, end;
         pliant_greens_share(g, columns, first, rank, size, &begin, &end);
         next += end - begin;
-        PliantCall(g->comm, status, err);
+        if (status == PLIANT_OK) status = pliant_interruption_check(err);
+        const PetscErrorCode code = pliant_refusal_agree(g->comm, status, err);
+        if (code) {
+            PetscCall(PetscFree(p.rows));
+            PetscCall(PetscFree(p.blocks));
+            PetscCall(code);
+        }
+        const int32_t batch_end = columns - first < g->batch ? columns : first + g->batch;
+        pliant_progress_update(progress, written + (int64_t)offset[batch_end]);
     }
     PetscCall(PetscFree(p.rows));
     PetscCall(PetscFree(p.blocks));
@@ -206,12 +216,13 @@ static pliant_status create(const char *path, const pliant_greens *g,
 
 // Collective: everything of one block's level.
 static PetscErrorCode write_level(pliant_writer *writer, pliant_greens *g, pliant_block_name block,
-                                  int32_t level, const uint64_t *offset, pliant_error *err)
+                                  int32_t level, const uint64_t *offset, int64_t written,
+                                  pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
     PetscMPIInt rank;
     PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
-    PetscCall(write_columns(writer, g, block, level, offset, err));
+    PetscCall(write_columns(writer, g, block, level, offset, written, progress, err));
     pliant_status status = PLIANT_OK;
     if (rank == 0) {
         char offset_path[PLIANT_PATH_LIMIT];
@@ -225,10 +236,18 @@ static PetscErrorCode write_level(pliant_writer *writer, pliant_greens *g, plian
     PetscFunctionReturn(0);
 }
 
+static int64_t blocks_of(const pliant_greens *g, pliant_block_name block, int32_t level,
+                         const uint64_t *offset)
+{
+    return (int64_t)offset[pliant_greens_column_count(g->problem, block, level)];
+}
+
 // Collective.
-static PetscErrorCode write_model(const char *path, pliant_greens *g, const pliant_lattice_data *lattice,
-                                  const pliant_options *options, const char *provenance, all_offsets *offsets, pliant_writer **writer,
-                                  double *bytes, pliant_error *err)
+static PetscErrorCode write_model(const char *path, pliant_greens *g,
+                                  const pliant_lattice_data *lattice, const pliant_options *options,
+                                  const char *provenance, all_offsets *offsets,
+                                  pliant_writer **writer, pliant_progress *progress, double *bytes,
+                                  pliant_error *err)
 {
     PetscFunctionBegin;
     PetscMPIInt rank;
@@ -248,13 +267,27 @@ static PetscErrorCode write_model(const char *path, pliant_greens *g, const plia
         if (status == PLIANT_OK) status = write_rest(*writer, g, lattice, options, provenance, err);
     }
     PliantCall(g->comm, status, err);
+    int64_t total = 0, done = 0;  // blocks
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = levels.first; l <= levels.last; l++)
             if (offsets->of[b][l])
-                PetscCall(write_level(*writer, g, (pliant_block_name)b, l, offsets->of[b][l], err));
+                total += blocks_of(g, (pliant_block_name)b, l, offsets->of[b][l]);
+    pliant_progress_begin(progress, "write", total);
+    for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
+        for (int32_t l = levels.first; l <= levels.last; l++) {
+            if (!offsets->of[b][l]) continue;
+            PetscCall(write_level(*writer, g, (pliant_block_name)b, l, offsets->of[b][l], done,
+                                  progress, err));
+            done += blocks_of(g, (pliant_block_name)b, l, offsets->of[b][l]);
+        }
     if (rank == 0) {
-        status = pliant_writer_commit(*writer, err);
-        *writer = NULL;
+        char temporary[4200];
+        snprintf(temporary, sizeof temporary, "%s.tmp", path);
+        status = g->partial ? pliant_partial_name(g->partial, temporary, err) : PLIANT_OK;
+        if (status == PLIANT_OK) {
+            status = pliant_writer_commit(*writer, err);
+            *writer = NULL;
+        }
         struct stat file;
         *bytes = status == PLIANT_OK && stat(path, &file) == 0 ? (double)file.st_size : 0;
     }
@@ -263,13 +296,16 @@ static PetscErrorCode write_model(const char *path, pliant_greens *g, const plia
 }
 
 PetscErrorCode pliant_model_output_write(const char *path, pliant_greens *g,
-                                         const pliant_lattice_data *lattice, const pliant_options *options, const char *provenance,
-                                         double *bytes, pliant_error *err)
+                                         const pliant_lattice_data *lattice,
+                                         const pliant_options *options, const char *provenance,
+                                         pliant_progress *progress, double *bytes,
+                                         pliant_error *err)
 {
     PetscFunctionBegin;
     all_offsets offsets = {0};
     pliant_writer *writer = NULL;
-    const PetscErrorCode code = write_model(path, g, lattice, options, provenance, &offsets, &writer, bytes, err);
+    const PetscErrorCode code =
+        write_model(path, g, lattice, options, provenance, &offsets, &writer, progress, bytes, err);
     pliant_writer_abandon(writer);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) PetscCall(PetscFree(offsets.of[b][l]));

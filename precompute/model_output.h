@@ -10,4 +10,5 @@
 PetscErrorCode pliant_model_output_write(const char *path, pliant_greens *greens,
                                          const pliant_lattice_data *lattice,
                                          const pliant_options *options, const char *provenance,
-                                         double *bytes, pliant_error *err);
+                                         pliant_progress *progress, double *bytes,
+                                         pliant_error *err);

@@ -40,6 +40,7 @@ enum {
     OPTION_NO_GREENS,
     OPTION_DENSE,
     OPTION_FORCE,
+    OPTION_RESUME,
     OPTION_JSON,
     OPTION_VERSION,
 };
@@ -71,6 +72,7 @@ static const struct option long_options[] = {
     {"no-greens", no_argument, NULL, OPTION_NO_GREENS},
     {"dense", required_argument, NULL, OPTION_DENSE},
     {"force", no_argument, NULL, OPTION_FORCE},
+    {"resume", no_argument, NULL, OPTION_RESUME},
     {"quiet", no_argument, NULL, 'q'},
     {"json", no_argument, NULL, OPTION_JSON},
     {"help", no_argument, NULL, 'h'},
@@ -152,6 +154,7 @@ static option_kind kind_of(int code)
     case OPTION_BOUNDARY:
     case OPTION_CONSTRAINT_LEVELS:
     case OPTION_BLOCKS:
+    case OPTION_RESUME:
     case OPTION_DENSE: return KIND_GREENS;
     case OPTION_HALF_WIDTH:
     case OPTION_SOLID:
@@ -218,6 +221,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case 'q': o.talk = PLIANT_TALK_ERRORS; break;
         case OPTION_JSON: o.reporting = PLIANT_REPORT_JSON; break;
         case OPTION_FORCE: o.existing = PLIANT_REPLACE_EXISTING; break;
+        case OPTION_RESUME: o.resuming = PLIANT_RESUME; break;
         case OPTION_DENSE: o.dense = optarg; break;
         case OPTION_FIXED: o.fixed_expression = optarg; break;
         case OPTION_FIXED_LIST: o.fixed_list = optarg; break;
@@ -288,6 +292,9 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         if (pliant_region_evaluate(o.fixed_expression, &nothing, &none, &inner) < 0)
             return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--fixed: %.480s", inner.text);
     }
+    if (o.dense && o.resuming == PLIANT_RESUME)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--resume: a run with --dense keeps nothing to resume from");
     if (scheme_given && o.subdivide < 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--scheme goes with --subdivide L");
     if (o.subdivide >= 0 && o.detail > o.subdivide)

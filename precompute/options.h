@@ -27,6 +27,11 @@ typedef enum pliant_existing {
     PLIANT_REPLACE_EXISTING,  // --force
 } pliant_existing;
 
+typedef enum pliant_resuming {
+    PLIANT_BEGIN_ANEW,
+    PLIANT_RESUME,  // --resume
+} pliant_resuming;
+
 // Levels of hierarchical Green's functions to solve for and store.
 typedef struct pliant_level_range {
     int32_t first, last;  // -1: from level 0, to the finest
@@ -56,6 +61,7 @@ typedef struct pliant_options {
     pliant_reporting reporting;
     pliant_talk talk;
     pliant_existing existing;
+    pliant_resuming resuming;
 } pliant_options;
 
 typedef enum pliant_options_action {

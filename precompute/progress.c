@@ -24,6 +24,12 @@ pliant_progress pliant_progress_create(const char *program)
 
 void pliant_progress_begin(pliant_progress *p, const char *phase, int64_t total)
 {
+    pliant_progress_begin_at(p, phase, 0, total);
+}
+
+void pliant_progress_begin_at(pliant_progress *p, const char *phase, int64_t done, int64_t total)
+{
+    p->first = done;
     p->phase = phase;
     p->total = total;
     p->begin = p->last = pliant_progress_clock();
@@ -32,12 +38,13 @@ void pliant_progress_begin(pliant_progress *p, const char *phase, int64_t total)
 
 void pliant_progress_update(pliant_progress *p, int64_t done)
 {
-    if (!p->program || p->total <= 0 || done <= 0) return;
+    if (!p->program || p->total <= 0 || done <= p->first) return;
     const double now = pliant_progress_clock(), elapsed = now - p->begin;
     if (now - p->last < (p->terminal ? bar_every : line_every)) return;
     p->last = now;
     const double part = (double)done / (double)p->total;
-    const double rate = (double)done / elapsed, left = elapsed * (1 - part) / part;
+    const double rate = (double)(done - p->first) / elapsed,
+                 left = (double)(p->total - done) / rate;
     if (!p->terminal) {
         fprintf(stderr, "%s: %s: %lld of %lld (%.0f%%), %.3g a second, %.0f s left\n", p->program,
                 p->phase, (long long)done, (long long)p->total, 100 * part, rate, left);

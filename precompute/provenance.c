@@ -101,3 +101,8 @@ char *pliant_provenance_text(const pliant_run_summary *summary, const pliant_mes
     fclose(out);
     return text;
 }
+
+const char *pliant_provenance_revision(void)
+{
+    return PLIANT_REVISION;
+}

@@ -7,3 +7,6 @@
 // what the run did not make, Green's functions or a lattice, has no lines.
 char *pliant_provenance_text(const pliant_run_summary *summary, const pliant_mesh *mesh,
                              const pliant_options *options, const char *command_line);
+
+// The revision that the program was built from; static.
+const char *pliant_provenance_revision(void);

@@ -1,7 +1,9 @@
 // run.c: one precomputation from its options to its file.
 #include "run.h"
 
+#include "identity.h"
 #include "input.h"
+#include "interruption.h"
 #include "model_output.h"
 #include "node_memory.h"
 #include "provenance.h"
@@ -76,8 +78,9 @@ static pliant_status check_levels(const pliant_problem *p, const pliant_options 
 }
 
 // Collective: state what the run will take, and refuse what cannot fit.
-static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const pliant_options *options,
-                                  const char *folder, pliant_progress *progress,
+static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
+                                  const pliant_options *options, const char *folder,
+                                  const pliant_partial *partial, pliant_progress *progress,
                                   pliant_run_summary *summary, pliant_error *err)
 {
     PetscFunctionBegin;
@@ -90,6 +93,8 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
     pliant_dense_plan plan;
     PetscCall(pliant_dense_system_plan(comm, p->vertex_count, solved, pliant_greens_batch(comm), &plan));
     summary->solver = plan.kind;
+    if (partial && pliant_partial_is_whole(partial))
+        plan.matrix_bytes = plan.right_hand_bytes = plan.batch_bytes = 0;
     const int all = options->blocks == PLIANT_BLOCKS_ALL;
     const double rows = all ? p->vertex_count : p->free_count;
     double stored = 0;  // columns of all levels
@@ -103,8 +108,18 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
     const double needed = plan.matrix_bytes + plan.right_hand_bytes + plan.batch_bytes + work + kept;
     summary->memory_bytes = needed;
     const double here = needed * node_size / size, available = pliant_node_available();
+    // On disk: the columns that are solved for, kept until the output is there, and coarser ones.
     const int is_spooled = options->compression.eps == 0 || levels.first < levels.last;
-    const double spool = is_spooled ? rows * stored * 44 * node_size / size : 0;
+    const double finest = p->free_hats->level_offset[levels.last + 1] +
+                          (all ? p->fixed_hats->level_offset[levels.last + 1] : 0);
+    const double resumable =
+        partial ? rows * finest *
+                      ((is_spooled ? 44 : 0) + (options->compression.eps > 0 ? 44.0 / 6 : 0))
+                : 0;
+    const double spool =
+        is_spooled ? rows * (partial ? stored - finest : stored) * 44 * node_size / size : 0;
+    char output_folder[4096];
+    folder_of(options->output, output_folder, sizeof output_folder);
 
     pliant_progress_note(progress,
                          "%d vertices in %d level%s, %d free and %d held; dense system of %d unknowns on "
@@ -112,23 +127,40 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p, const 
                          p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
                          p->free_count, p->fixed_count, 3 * p->vertex_count, size, size == 1 ? "" : "s", plan.kind);
     if (levels.last < p->multires->level_count - 1)
-        pliant_progress_note(progress, "columns of levels %d..%d: %d are solved for instead of %.0f", levels.first,
-                             levels.last, solved, rows);
-    pliant_progress_note(progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available; "
-                         "temporary columns up to %.3g GB in %s",
-                         needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9,
-                         available / 1e9, spool / 1e9, folder);
+        pliant_progress_note(progress,
+                             "columns of levels %d..%d: %d are solved for instead of %.0f",
+                             levels.first, levels.last, solved, rows);
+    pliant_progress_note(
+        progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available",
+        needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9, available / 1e9);
+    if (partial)
+        pliant_progress_note(
+            progress,
+            "disk: columns up to %.3g GB in %s until the output is there, so that --resume can "
+            "go on after an interruption; up to %.3g GB more for a while in %s",
+            resumable / 1e9, pliant_partial_folder(partial), spool / 1e9, folder);
+    else
+        pliant_progress_note(
+            progress, "disk: temporary columns up to %.3g GB in %s; an interrupted run begins anew",
+            spool / 1e9, folder);
     pliant_status status = PLIANT_OK;
     struct statvfs disk;
+    const double to_come = partial ? resumable - pliant_partial_bytes(partial) : 0;
     if (available > 0 && here > available)
         status = pliant_error_set(err, PLIANT_ERR_MEMORY,
                                   "%s: needs %.2f GB of memory on this machine, %.2f GB are available: "
                                   "use more machines or a coarser mesh",
                                   options->mesh, here / 1e9, available / 1e9);
     else if (statvfs(folder, &disk) == 0 && spool > (double)disk.f_bavail * (double)disk.f_frsize)
-        status = pliant_error_set(err, PLIANT_ERR_IO,
-                                  "%s: needs %.2f GB for temporary columns, %.2f GB are free: set TMPDIR",
-                                  folder, spool / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
+        status = pliant_error_set(
+            err, PLIANT_ERR_IO,
+            "%s: needs %.2f GB for temporary columns, %.2f GB are free: set TMPDIR", folder,
+            spool / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
+    else if (statvfs(output_folder, &disk) == 0 &&
+             to_come > (double)disk.f_bavail * (double)disk.f_frsize)
+        status = pliant_error_set(
+            err, PLIANT_ERR_IO, "%s: needs %.2f GB more for columns, %.2f GB are free",
+            output_folder, to_come / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
     PliantCall(comm, status, err);
     PetscFunctionReturn(0);
 }
@@ -156,6 +188,7 @@ static PetscErrorCode assemble(MPI_Comm comm, const pliant_problem *p, const pli
     pliant_status status = pliant_bem_create(p->multires->mesh, &options->material, &bem, err);
     pliant_progress_begin(progress, "assemble", rows.row_end - rows.row_begin);
     for (int32_t v = rows.row_begin; v < rows.row_end && status == PLIANT_OK; v += assembly_step) {
+        if ((status = pliant_interruption_check(err)) < 0) break;
         const int32_t end = rows.row_end - v < assembly_step ? rows.row_end : v + assembly_step;
         const size_t at = 3 * (size_t)(v - rows.row_begin);
         status = pliant_bem_assemble(bem, v, end, p->held, rows.A + at, rows.ld_a, B, ld, rows.gravity + at,
@@ -189,7 +222,95 @@ typedef struct held {
     pliant_sample_row sample;
     pliant_greens *greens;
     pliant_dense_output *dense;
+    pliant_partial *partial;
 } held;
+
+static const char nothing_kept[] = "nothing is kept";
+
+// From here on a signal waits for the work in hand.
+static void work_in_hand(const held *h)
+{
+    pliant_interruption_wait(h->partial ? "--resume will go on from there" : nothing_kept);
+}
+
+// Collective. From here on there is no work in hand that a signal could spoil, or none that could
+// wait for it.
+static PetscErrorCode nothing_in_hand(MPI_Comm comm, const held *h, pliant_error *err)
+{
+    PetscFunctionBegin;
+    const int is_empty = h->partial && !pliant_partial_is_kept(h->partial);
+    pliant_interruption_at_once(h->partial ? pliant_partial_text(h->partial) : nothing_kept,
+                                is_empty ? pliant_partial_journal(h->partial) : NULL,
+                                is_empty ? pliant_partial_folder(h->partial) : NULL);
+    // One that came a moment before.
+    PliantCall(comm, pliant_interruption_check(err), err);
+    PetscFunctionReturn(0);
+}
+
+// Collective: where solved columns will wait, with what an interrupted run has left there.
+static PetscErrorCode open_partial(MPI_Comm comm, const pliant_options *options,
+                                   pliant_progress *progress, held *h, pliant_error *err)
+{
+    PetscFunctionBegin;
+    const pliant_problem *p = h->problem;
+    const int32_t level = p->levels.last;
+    PetscMPIInt rank;
+    PetscCallMPI(MPI_Comm_rank(comm, &rank));
+    pliant_partial_def def = {.output = options->output,
+                              .row_limit = p->vertex_count,
+                              .batch = pliant_greens_batch(comm),
+                              .column_count = {p->free_hats->level_offset[level + 1]}};
+    if (options->resuming == PLIANT_RESUME) def.wish = PLIANT_PARTIAL_RESUME;
+    else if (options->existing == PLIANT_REPLACE_EXISTING) def.wish = PLIANT_PARTIAL_DISCARD;
+    if (options->blocks == PLIANT_BLOCKS_ALL)
+        def.column_count[1] = p->fixed_hats->level_offset[level + 1];
+    pliant_greens_streams(p, options, def.domain);
+    char *identity = NULL;
+    PliantCall(comm, rank == 0 ? pliant_identity_create(options, p, &identity, err) : PLIANT_OK,
+               err);
+    def.identity = identity;
+    const PetscErrorCode code = pliant_partial_create(comm, &def, progress, &h->partial, err);
+    free(identity);
+    PetscCall(code);
+    // The dense file is written in passing and cannot be taken up again.
+    if (options->dense) PetscCall(pliant_partial_destroy(&h->partial));
+    PetscFunctionReturn(0);
+}
+
+// Collective: the columns' system, assembled and factored.
+static PetscErrorCode make_system(MPI_Comm comm, const pliant_options *options,
+                                  pliant_progress *progress, pliant_run_summary *s, held *h,
+                                  pliant_error *err)
+{
+    PetscFunctionBegin;
+    const pliant_problem *p = h->problem;
+    const int32_t solved = pliant_right_hand_count(p, options->blocks);
+    PetscCall(pliant_dense_system_create(comm, p->vertex_count, solved, pliant_greens_batch(comm),
+                                         &h->system));
+    work_in_hand(h);
+    PetscCall(assemble(comm, p, options, h->system, &h->sample, progress, err));
+    PetscCallMPI(MPI_Barrier(comm));
+    s->times.assemble = pliant_progress_end(progress);
+
+    const double unknowns = 3.0 * p->vertex_count,
+                 factor_flops = 2 * unknowns * unknowns * unknowns / 3;
+    if (factor_flops > long_factor_flops)
+        pliant_progress_note(
+            progress, "factor: %.1f TFLOP in one piece; the solves will take %.1f times that",
+            factor_flops / 1e12, 2 * unknowns * unknowns * 3 * solved / factor_flops);
+    pliant_progress_begin(progress, "factor", 0);
+    PetscCall(nothing_in_hand(comm, h, err));
+    int singular;
+    PetscCall(pliant_dense_system_factor(h->system, &singular));
+    pliant_status status = PLIANT_OK;
+    if (singular)
+        status = pliant_error_set(
+            err, PLIANT_ERR_SINGULAR,
+            "%s: the boundary element system is singular: hold more of the surface", options->mesh);
+    PliantCall(comm, status, err);
+    s->times.factor = pliant_progress_end(progress);
+    PetscFunctionReturn(0);
+}
 
 // The first rank's, of any run.
 static pliant_status build_lattice(const pliant_options *options, const pliant_multires *multires,
@@ -224,6 +345,9 @@ static pliant_status work_alone(const pliant_options *options, const char *comma
     if (status < 0) return status;
 
     pliant_progress_begin(progress, "write", 0);
+    char temporary[4200];
+    snprintf(temporary, sizeof temporary, "%s.tmp", options->output);
+    pliant_interruption_at_once(nothing_kept, temporary, NULL);
     char *text = pliant_provenance_text(s, m->mesh, options, command_line);
     if (!text) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for the provenance");
     status = pliant_lattice_output_file(options->output, m, &options->material, h->lattice, text,
@@ -268,27 +392,13 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
 
     char folder[4096];
     spool_folder(options->output, folder, sizeof folder);
-    PetscCall(plan_memory(comm, p, options, folder, progress, s, err));
-    const int32_t solved = pliant_right_hand_count(p, options->blocks);
-    PetscCall(pliant_dense_system_create(comm, p->vertex_count, solved, pliant_greens_batch(comm), &h->system));
-    PetscCall(assemble(comm, p, options, h->system, &h->sample, progress, err));
-    PetscCallMPI(MPI_Barrier(comm));
-    s->times.assemble = pliant_progress_end(progress);
+    PetscCall(open_partial(comm, options, progress, h, err));
+    PetscCall(plan_memory(comm, p, options, folder, h->partial, progress, s, err));
+    if (!h->partial || !pliant_partial_is_whole(h->partial))
+        PetscCall(make_system(comm, options, progress, s, h, err));
 
-    const double unknowns = 3.0 * p->vertex_count, factor_flops = 2 * unknowns * unknowns * unknowns / 3;
-    if (factor_flops > long_factor_flops)
-        pliant_progress_note(progress, "factor: %.1f TFLOP in one piece; the solves will take %.1f times that",
-                             factor_flops / 1e12, 2 * unknowns * unknowns * 3 * solved / factor_flops);
-    pliant_progress_begin(progress, "factor", 0);
-    int singular;
-    PetscCall(pliant_dense_system_factor(h->system, &singular));
-    if (singular)
-        status = pliant_error_set(err, PLIANT_ERR_SINGULAR,
-                                  "%s: the boundary element system is singular: hold more of the surface", options->mesh);
-    PliantCall(comm, status, err);
-    s->times.factor = pliant_progress_end(progress);
-
-    PetscCall(pliant_greens_create(comm, p, options, folder, &h->greens, err));
+    work_in_hand(h);
+    PetscCall(pliant_greens_create(comm, p, options, folder, h->partial, &h->greens, err));
     if (options->dense)
         PetscCall(pliant_dense_output_create(comm, options->dense, p, options->blocks, &h->dense, err));
     PetscCall(pliant_greens_solve(h->greens, h->system, &h->sample, h->dense, progress, err));
@@ -297,29 +407,49 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     s->times.transform = h->greens->transform_seconds;
     s->residual = h->greens->residual;
     if (!(s->residual <= residual_bound))
-        status = pliant_error_set(err, PLIANT_ERR_SINGULAR,
-                                  "%s: the solved columns miss the system by %.1e (expected under %.0e): "
-                                  "the support or the material makes it nearly singular",
-                                  options->mesh, s->residual, residual_bound);
+        status = pliant_error_set(
+            err, PLIANT_ERR_SINGULAR,
+            "%s: the solved columns miss the system by %.1e (expected under %.0e): "
+            "the support or the material makes it nearly singular",
+            options->mesh, s->residual, residual_bound);
+    if (status < 0 && h->partial) pliant_partial_finish(h->partial);  // no use to anybody
     PliantCall(comm, status, err);
     PetscCall(pliant_dense_system_destroy(&h->system));
 
-    pliant_progress_begin(progress, "compress", 0);
-    PetscCall(pliant_greens_compress(h->greens, err));
+    PetscCall(nothing_in_hand(comm, h, err));
+    PetscCall(pliant_greens_compress(h->greens, progress, err));
     s->times.compress = pliant_progress_end(progress);
     memcpy(s->results, h->greens->results, sizeof s->results);
 
+    work_in_hand(h);
     pliant_progress_begin(progress, "write", 0);
     char *text = pliant_provenance_text(s, p->multires->mesh, options, command_line);
     PetscErrorCode code = 0;
     if (!text) code = PETSC_ERR_MEM;
     if (code == 0 && h->dense) code = pliant_dense_output_commit(h->dense, err);
     if (code == 0)
-        code = pliant_model_output_write(options->output, h->greens, h->lattice, options, text, &s->file_bytes,
-                                         err);
+        code = pliant_model_output_write(options->output, h->greens, h->lattice, options, text,
+                                         progress, &s->file_bytes, err);
     free(text);
     PetscCall(code);
+    if (h->partial) pliant_partial_finish(h->partial);
     s->times.write = pliant_progress_end(progress);
+    PetscFunctionReturn(0);
+}
+
+// Collective: a refusal is an interruption, or leaves something to resume from: `err` says so.
+static PetscErrorCode tell_of_partial(MPI_Comm comm, pliant_partial *partial, pliant_run_summary *s,
+                                      pliant_error *err)
+{
+    PetscFunctionBegin;
+    const pliant_error inner = *err;
+    PetscCall(pliant_interruption_agree(comm, &s->signal));
+    if (s->signal)
+        pliant_error_set(err, PLIANT_ERR_IO, "interrupted: %.480s",
+                         partial ? pliant_partial_text(partial) : nothing_kept);
+    else if (partial && pliant_partial_is_taken_up(partial) && pliant_partial_is_kept(partial))
+        pliant_error_set(err, PLIANT_ERR_IO, "%.250s; %.250s", inner.text,
+                         pliant_partial_text(partial));
     PetscFunctionReturn(0);
 }
 
@@ -334,6 +464,11 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     PetscCallMPI(MPI_Comm_size(comm, &summary->ranks));
     const double begin = pliant_progress_clock();
     pliant_status status = PLIANT_OK;
+    if (rank == 0 && options->resuming == PLIANT_RESUME &&
+        options->existing == PLIANT_KEEP_EXISTING)
+        summary->was_finished = pliant_partial_was_finished(options->output);
+    PetscCallMPI(MPI_Bcast(&summary->was_finished, 1, MPI_INT, 0, comm));
+    if (summary->was_finished) PetscFunctionReturn(0);
     if (rank == 0) {
         status = check_output(options->output, options->existing, err);
         if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
@@ -344,8 +479,11 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     if (code == 0 && options->greens == PLIANT_GREENS_SOLVE)
         code = work(comm, options, command_line, progress, summary, &h, err);
     summary->times.total = pliant_progress_clock() - begin;
+    if (code == PLIANT_REFUSED) PetscCall(tell_of_partial(comm, h.partial, summary, err));
     PetscCall(pliant_dense_output_destroy(&h.dense));
     PetscCall(pliant_greens_destroy(&h.greens));
+    // After an error of one rank's own the others may be anywhere: no waiting for them.
+    if (code == 0 || code == PLIANT_REFUSED) PetscCall(pliant_partial_destroy(&h.partial));
     PetscCall(PetscFree(h.sample.right));
     PetscCall(PetscFree(h.sample.A));
     PetscCall(pliant_dense_system_destroy(&h.system));

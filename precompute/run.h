@@ -19,7 +19,9 @@ typedef struct pliant_run_summary {
     pliant_level_range levels;  // stored
     int32_t column_counts[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
     pliant_greens_result results[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
-    int misused;  // 1: what was refused is the command line, seen beside its mesh
+    int signal;        // the run was interrupted by it; else 0
+    int was_finished;  // 1: the output was there already, of the run that was to be resumed
+    int misused;       // 1: what was refused is the command line, seen beside its mesh
     pliant_run_times times;
 } pliant_run_summary;
 

@@ -3,78 +3,52 @@
 
 #include "pliant/error.h"
 
-#include <errno.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 typedef struct entry {
-    int32_t column, count;
-    uint64_t offset;  // of the rows; norms and blocks follow
-    double peak, energy;
+    pliant_spooled column;  // without rows until seal where it lies in the file
+    uint64_t offset;        // in the file
 } entry;
 
 struct pliant_spool {
-    char *folder;
-    FILE *file;
-    uint64_t bytes;
+    pliant_column_file *own, *file;  // own NULL: borrowed
+    int32_t stream;
     entry *entries;
     int32_t entry_count, entry_capacity;
-    const char *map;
 };
 
-static pliant_status refuse(const pliant_spool *spool, const char *what, pliant_error *err)
+pliant_status pliant_spool_create_in(pliant_column_file *file, int32_t stream, pliant_spool **spool,
+                                     pliant_error *err)
 {
-    return pliant_error_set(err, PLIANT_ERR_IO, "%s: cannot %s the temporary file of columns: %s",
-                            spool->folder, what, strerror(errno));
+    pliant_spool *s = calloc(1, sizeof *s);
+    if (!s) return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a spool");
+    s->file = file;
+    s->stream = stream;
+    *spool = s;
+    return PLIANT_OK;
 }
 
 pliant_status pliant_spool_create(const char *folder, pliant_spool **spool, pliant_error *err)
 {
-    pliant_spool *s = calloc(1, sizeof *s);
-    const size_t length = strlen(folder) + sizeof "/.pliant-spool-XXXXXX";
-    char *path = malloc(length);
-    pliant_status status = PLIANT_OK;
-    if (!s || !path || !(s->folder = strdup(folder))) {
-        status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for a spool");
-        goto done;
-    }
-    snprintf(path, length, "%s/.pliant-spool-XXXXXX", folder);
-    const int file = mkstemp(path);
-    if (file < 0) {
-        status = refuse(s, "create", err);
-        goto done;
-    }
-    unlink(path);
-    s->file = fdopen(file, "w+b");
-    if (!s->file) {
-        close(file);
-        status = refuse(s, "open", err);
-        goto done;
-    }
-    // Whole columns at a time: a few hundred kilobytes each.
-    setvbuf(s->file, NULL, _IOFBF, 1 << 20);
-    *spool = s;
-    s = NULL;
-done:
-    free(path);
-    pliant_spool_destroy(s);
+    pliant_column_file *own;
+    pliant_status status = pliant_column_file_create_temporary(folder, &own, err);
+    if (status < 0) return status;
+    status = pliant_spool_create_in(own, 0, spool, err);
+    if (status < 0) pliant_column_file_destroy(own);
+    else (*spool)->own = own;
     return status;
 }
 
 void pliant_spool_destroy(pliant_spool *spool)
 {
     if (!spool) return;
-    if (spool->map) munmap((void *)(uintptr_t)spool->map, spool->bytes);
-    if (spool->file) fclose(spool->file);
+    pliant_column_file_destroy(spool->own);
     free(spool->entries);
-    free(spool->folder);
     free(spool);
 }
 
-pliant_status pliant_spool_append(pliant_spool *s, const pliant_spooled *column, pliant_error *err)
+static pliant_status enter(pliant_spool *s, const pliant_spooled *column, uint64_t offset,
+                           pliant_error *err)
 {
     if (s->entry_count == s->entry_capacity) {
         const int32_t capacity = s->entry_capacity ? 2 * s->entry_capacity : 256;
@@ -84,23 +58,33 @@ pliant_status pliant_spool_append(pliant_spool *s, const pliant_spooled *column,
         s->entries = entries;
         s->entry_capacity = capacity;
     }
-    const size_t count = (size_t)column->count;
-    if (fwrite(column->rows, sizeof *column->rows, count, s->file) != count ||
-        fwrite(column->norms, sizeof *column->norms, count, s->file) != count ||
-        fwrite(column->blocks, 9 * sizeof *column->blocks, count, s->file) != count)
-        return refuse(s, "write to", err);
-    s->entries[s->entry_count++] = (entry){column->column, column->count, s->bytes, column->peak, column->energy};
-    s->bytes += count * (sizeof *column->rows + 10 * sizeof *column->blocks);
+    s->entries[s->entry_count++] = (entry){*column, offset};
     return PLIANT_OK;
+}
+
+pliant_status pliant_spool_append(pliant_spool *s, const pliant_spooled *column, pliant_error *err)
+{
+    uint64_t offset;
+    const pliant_status status =
+        pliant_column_file_append(s->file, s->stream, column, &offset, err);
+    if (status < 0) return status;
+    pliant_spooled later = *column;
+    later.rows = NULL;
+    return enter(s, &later, offset, err);
+}
+
+pliant_status pliant_spool_adopt(pliant_spool *s, const pliant_spooled *column, pliant_error *err)
+{
+    return enter(s, column, 0, err);
 }
 
 pliant_status pliant_spool_seal(pliant_spool *s, pliant_error *err)
 {
-    if (fflush(s->file) != 0) return refuse(s, "write to", err);
-    if (s->bytes == 0) return PLIANT_OK;
-    void *map = mmap(NULL, s->bytes, PROT_READ, MAP_SHARED, fileno(s->file), 0);
-    if (map == MAP_FAILED) return refuse(s, "map", err);
-    s->map = map;
+    const pliant_status status = pliant_column_file_map(s->file, err);
+    if (status < 0) return status;
+    for (int32_t i = 0; i < s->entry_count; i++)
+        if (!s->entries[i].column.rows)
+            s->entries[i].column = pliant_column_file_at(s->file, s->entries[i].offset);
     return PLIANT_OK;
 }
 
@@ -111,9 +95,5 @@ int32_t pliant_spool_column_count(const pliant_spool *spool)
 
 pliant_spooled pliant_spool_column(const pliant_spool *spool, int32_t index)
 {
-    const entry *e = &spool->entries[index];
-    const int32_t *rows = (const int32_t *)(const void *)(spool->map + e->offset);
-    const float *norms = (const float *)(const void *)(rows + e->count);
-    return (pliant_spooled){.column = e->column, .count = e->count, .rows = rows, .norms = norms,
-                            .blocks = norms + e->count, .peak = e->peak, .energy = e->energy};
+    return spool->entries[index].column;
 }
