@@ -33,6 +33,8 @@ struct pliant_compression {
     pliant_spooled
         scratch;  // a column on its way to the spool: room for m blocks; with a spool only
     pliant_kept_set kept;
+    void (*tell)(void *context, double part);  // of the decision; NULL: nobody listens
+    void *context;
     double exact_energy;      // sum over this rank's columns of |xi_j|^2
     double error_energy;      // the same of the stored columns' errors
     double worst;             // GF-71 so far
@@ -158,6 +160,12 @@ void pliant_compression_destroy(pliant_compression *c)
     pliant_compression_settle(c);
     pliant_kept_set_destroy(&c->kept);
     free(c);
+}
+
+void pliant_compression_listen(pliant_compression *c, void (*tell)(void *context, double part), void *context)
+{
+    c->tell = tell;
+    c->context = context;
 }
 
 double *pliant_compression_group(pliant_compression *c)
@@ -292,7 +300,7 @@ pliant_status pliant_compression_decide(pliant_compression *c, MPI_Comm comm,
         if (all < 0) return (pliant_status)sealed;
     }
     if (c->def.eps == 0) {
-        const pliant_threshold_targets targets = {c->def.rms, c->def.max};
+        const pliant_threshold_targets targets = {c->def.rms, c->def.max, c->tell, c->context};
         pliant_threshold_outcome outcome;
         const pliant_status status = pliant_threshold_search(c->wavelet, c->spool, &targets, exact, comm,
                                                              &c->kept, &outcome, err);

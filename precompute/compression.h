@@ -67,6 +67,9 @@ PLIANT_UNUSED_RESULT pliant_status pliant_compression_add(pliant_compression *co
                                                           const int32_t *columns, int32_t count,
                                                           pliant_error *err);
 
+// Whom `decide` tells what part of it is done, 0 to 1.
+void pliant_compression_listen(pliant_compression *compression, void (*tell)(void *context, double part),
+                               void *context);
 // Collective: decide what is kept, once all columns are in. When a rank fails all return, that rank
 // with its status and the others with PLIANT_OK or theirs: agree on it before going on.
 PLIANT_UNUSED_RESULT pliant_status pliant_compression_decide(pliant_compression *compression,

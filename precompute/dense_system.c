@@ -152,6 +152,37 @@ pliant_dense_rows pliant_dense_system_rows(const pliant_dense_system *s)
     return rows;
 }
 
+PetscErrorCode pliant_dense_system_estimate(const pliant_dense_system *s, double *seconds)
+{
+    PetscFunctionBegin;
+    *seconds = 0;
+    // Operations grow with the cube.
+    static const PetscInt part = 8;
+    const PetscInt rows = 3 * s->n / part;
+    if (s->kind == SCALAPACK || rows == 0) PetscFunctionReturn(0);
+    // The first one wakes the threads and touches the memory.
+    for (int trial = 0; s->rank == 0 && trial < 2; trial++) {
+        Mat small;
+        double *a;
+        PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, rows, rows, NULL, &small));
+        PetscCall(MatDenseGetArrayWrite(small, &a));
+        // Any numbers without a small pivot.
+        for (PetscInt j = 0; j < rows; j++)
+            for (PetscInt i = 0; i < rows; i++)
+                a[(size_t)j * (size_t)rows + (size_t)i] = i == j ? (double)rows : (double)((7 * i + 13 * j) % 11) / 11;
+        PetscCall(MatDenseRestoreArrayWrite(small, &a));
+        pliant_node_threads(s->size);
+        const double begin = MPI_Wtime();
+        PetscCall(MatLUFactor(small, NULL, NULL, NULL));
+        *seconds = (MPI_Wtime() - begin) * part * part * part;
+        pliant_node_threads(1);
+        PetscCall(MatDestroy(&small));
+    }
+    PetscCall(pliant_node_wait(s->comm));
+    PetscCallMPI(MPI_Bcast(seconds, 1, MPI_DOUBLE, 0, s->comm));
+    PetscFunctionReturn(0);
+}
+
 PetscErrorCode pliant_dense_system_factor(pliant_dense_system *s, int *singular)
 {
     PetscFunctionBegin;

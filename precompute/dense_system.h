@@ -46,6 +46,8 @@ typedef struct pliant_dense_rows {
 } pliant_dense_rows;
 pliant_dense_rows pliant_dense_system_rows(const pliant_dense_system *system);
 
+// Collective: seconds that factor will take, about, from a matrix of an eighth of the rows; 0: unknown.
+PetscErrorCode pliant_dense_system_estimate(const pliant_dense_system *system, double *seconds);
 // Collective: LU with partial pivoting in place of A. *singular is 1 when a pivot vanished.
 PetscErrorCode pliant_dense_system_factor(pliant_dense_system *system, int *singular);
 

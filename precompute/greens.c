@@ -404,6 +404,18 @@ static PetscErrorCode measure_definiteness(pliant_greens *g, int32_t level, plia
     PetscFunctionReturn(0);
 }
 
+// Progress of the level that is being decided on, in columns.
+typedef struct level_progress {
+    pliant_progress *progress;
+    int64_t before, columns;
+} level_progress;
+
+static void tell_level(void *context, double part)
+{
+    const level_progress *level = context;
+    pliant_progress_update(level->progress, level->before + (int64_t)(part * (double)level->columns));
+}
+
 PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_progress *progress,
                                       pliant_error *err)
 {
@@ -419,6 +431,8 @@ PetscErrorCode pliant_greens_compress(pliant_greens *g, pliant_progress *progres
         if (!g->blocks[b][levels.last]) continue;
         for (int32_t l = levels.last; l >= levels.first; l--) {
             pliant_compression *fine = g->blocks[b][l];
+            level_progress level = {progress, done, pliant_greens_column_count(g->problem, block, l)};
+            pliant_compression_listen(fine, tell_level, &level);
             PliantCall(g->comm, pliant_compression_decide(fine, g->comm, &g->results[b][l].compression, err), err);
             if (l > levels.first) {
                 PliantCall(g->comm, create_level(g, block, l - 1, err), err);

@@ -154,12 +154,12 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     else if (statvfs(folder, &disk) == 0 && spool > (double)disk.f_bavail * (double)disk.f_frsize)
         status = pliant_error_set(
             err, PLIANT_ERR_IO,
-            "%s: needs %.2f GB for temporary columns, %.2f GB are free: set TMPDIR", folder,
+            "%s: needs %.3g GB for temporary columns, %.3g GB are free: set TMPDIR", folder,
             spool / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
     else if (statvfs(output_folder, &disk) == 0 &&
              to_come > (double)disk.f_bavail * (double)disk.f_frsize)
         status = pliant_error_set(
-            err, PLIANT_ERR_IO, "%s: needs %.2f GB more for columns, %.2f GB are free",
+            err, PLIANT_ERR_IO, "%s: needs %.3g GB more for columns, %.3g GB are free",
             output_folder, to_come / 1e9, (double)disk.f_bavail * (double)disk.f_frsize / 1e9);
     PliantCall(comm, status, err);
     PetscFunctionReturn(0);
@@ -294,10 +294,16 @@ static PetscErrorCode make_system(MPI_Comm comm, const pliant_options *options,
 
     const double unknowns = 3.0 * p->vertex_count,
                  factor_flops = 2 * unknowns * unknowns * unknowns / 3;
-    if (factor_flops > long_factor_flops)
-        pliant_progress_note(
-            progress, "factor: %.1f TFLOP in one piece; the solves will take %.1f times that",
-            factor_flops / 1e12, 2 * unknowns * unknowns * 3 * solved / factor_flops);
+    if (factor_flops > long_factor_flops) {
+        double seconds;
+        char about[64] = "";
+        PetscCall(pliant_dense_system_estimate(h->system, &seconds));
+        if (seconds > 0) snprintf(about, sizeof about, ", about %.0f s", seconds);
+        pliant_progress_note(progress,
+                             "factor: %.2g TFLOP in one piece%s; the solves will take %.1f times that",
+                             factor_flops / 1e12, about,
+                             2 * unknowns * unknowns * 3 * solved / factor_flops);
+    }
     pliant_progress_begin(progress, "factor", 0);
     PetscCall(nothing_in_hand(comm, h, err));
     int singular;

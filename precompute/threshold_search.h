@@ -20,6 +20,9 @@
 typedef struct pliant_threshold_targets {
     double rms;  // bound on GF-70, 0: none
     double max;  // bound on GF-71, 0: none
+    // Told now and then what part of the search is done, 0 to 1: an estimate. NULL: nobody listens.
+    void (*tell)(void *context, double part);
+    void *context;
 } pliant_threshold_targets;
 
 typedef struct pliant_threshold_outcome {
