@@ -18,6 +18,13 @@ static const char model[] =
     "  --scheme SCHEME         loop, butterfly or midpoint (default loop)\n"
     "                          Without --subdivide, MESH is the finest level and its subdivision\n"
     "                          connectivity is detected, whatever its vertex order.\n"
+    "  --remesh BASE           MESH is any closed surface: make a mesh with levels of it, from a base of "
+    "so\n"
+    "                          many vertices; auto takes the smallest one that keeps within 1% of the\n"
+    "                          diagonal, without a flipped triangle or an angle under 10 degrees\n"
+    "  --levels L              of --remesh: split the base L times (default: as deep as 12000 vertices\n"
+    "                          allow)\n"
+    "  --mesh-only             write the mesh of --remesh to -o FILE.obj or FILE.ply; solve nothing\n"
     "  --detail D              the D finest levels are geometric detail: elasticity is solved on "
     "the mesh\n"
     "                          of the others, the finer shape is stored as a displaced "
@@ -95,6 +102,7 @@ static const char output[] =
     "interrupted.\n"
     "\n"
     "examples: mpirun -n 2 pliant-precompute --subdivide 4 --fixed 'z<0.1' base.obj -o model.h5\n"
+    "          pliant-precompute --remesh auto --levels 3 --mesh-only scan.ply -o model.obj\n"
     "          pliant-precompute --lattice 20 --half-width 2 --no-greens statue.obj -o statue.h5\n";
 
 const char *const pliant_options_help[] = {model, output, NULL};

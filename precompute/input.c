@@ -3,10 +3,13 @@
 
 #include "mesh/mesh_file.h"
 #include "node_memory.h"
+#include "remesh/remesh.h"
+#include "remesh/repair.h"
 
 #include "pliant/error.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 // Weights of the limit surface while detail is measured, twelve a vertex on two levels, and faces.
 static const double detail_bytes = 1200;
@@ -57,6 +60,45 @@ static pliant_status find_levels(const pliant_options *options, const pliant_mes
     return pliant_multires_detect(mesh, multires, err);
 }
 
+// Numbers of the mesh that was repaired, in those of the file.
+static void rename_sources(pliant_multires *multires, const int32_t *source)
+{
+    for (int32_t v = 0; v < multires->mesh->vertex_count; v++)
+        if (multires->source_index[v] >= 0) multires->source_index[v] = source[multires->source_index[v]];
+}
+
+// --remesh: mend what is small, and make a mesh with levels.
+static pliant_status read_arbitrary(const pliant_options *options, pliant_progress *progress,
+                                    pliant_mesh **mesh, pliant_input *input, pliant_error *err)
+{
+    pliant_repair_report repaired;
+    int32_t *source = NULL;
+    pliant_status status = pliant_repair(mesh, &source, &repaired, err);
+    if (status < 0) return status;
+    if (repaired.text[0]) pliant_progress_note(progress, "%s: %s", options->mesh, repaired.text);
+    status = pliant_mesh_check(*mesh, options->mesh, &input->report, err);
+    if (status == PLIANT_OK) {
+        pliant_remesh_report *r = &input->remesh;
+        status = pliant_remesh(*mesh, &options->remesh, &input->multires, r, err);
+        if (status < 0) {
+            const pliant_error inner = *err;
+            status = pliant_error_set(err, status, "%s: --remesh: %.400s", options->mesh, inner.text);
+        } else {
+            rename_sources(input->multires, source);
+            pliant_progress_note(progress,
+                                 "%s: remeshed: %d base vertices, %d level%s above, %d vertices; distance %.2f%% of "
+                                 "the diagonal there, %.2f%% back; smallest angle %.1f degrees; normals off by %.1f "
+                                 "degrees (mean), %.1f (largest); %d flipped%s",
+                                 options->mesh, r->base_vertices, r->levels, r->levels == 1 ? "" : "s",
+                                 input->multires->mesh->vertex_count, 100 * r->fit.there, 100 * r->fit.back,
+                                 r->fit.smallest_angle, r->fit.normal_mean, r->fit.normal_largest,
+                                 r->fit.flipped_count, r->met ? "" : ": more than what is aimed at");
+        }
+    }
+    free(source);
+    return status;
+}
+
 pliant_status pliant_input_read(const pliant_options *options, pliant_progress *progress,
                                 pliant_input *input, pliant_error *err)
 {
@@ -65,13 +107,17 @@ pliant_status pliant_input_read(const pliant_options *options, pliant_progress *
     pliant_status status = pliant_mesh_file_read(options->mesh, &mesh, err);
     if (status < 0) return status;
     input->vertex_count = mesh->vertex_count;
-    if ((status = pliant_mesh_check(mesh, options->mesh, report, err)) < 0) goto done;
-    if (report->turned_count > 0)
-        pliant_progress_note(progress, "%s: %d faces looked inwards and were turned", options->mesh,
-                             report->turned_count);
-
-    if (options->subdivide >= 0 && (status = check_size(mesh, options, err)) < 0) goto done;
-    status = find_levels(options, mesh, &input->multires, err);
+    if (options->remeshing == PLIANT_REMESH_FIRST) {
+        status = read_arbitrary(options, progress, &mesh, input, err);
+        if (status < 0) goto done;
+    } else {
+        if ((status = pliant_mesh_check(mesh, options->mesh, report, err)) < 0) goto done;
+        if (report->turned_count > 0)
+            pliant_progress_note(progress, "%s: %d faces looked inwards and were turned", options->mesh,
+                                 report->turned_count);
+        if (options->subdivide >= 0 && (status = check_size(mesh, options, err)) < 0) goto done;
+        status = find_levels(options, mesh, &input->multires, err);
+    }
     if (status == PLIANT_OK && options->detail > 0)
         status = pliant_relief_split(&input->multires, options->detail, &input->relief, err);
     if (status < 0) {

@@ -5,12 +5,14 @@
 #include "mesh/relief.h"
 #include "options.h"
 #include "progress.h"
+#include "remesh/remesh.h"
 
 typedef struct pliant_input {
     pliant_multires *multires;
     pliant_relief *relief;  // --detail: what was taken off the mesh; else NULL
     int32_t vertex_count;   // of MESH, before any change
     pliant_mesh_report report;
+    pliant_remesh_report remesh;  // --remesh: what was made; else zero
 } pliant_input;
 
 // Read and check MESH, refine it or detect its levels, take detail off. A run without Green's

@@ -32,19 +32,37 @@ static void print_text_lattice(const pliant_lattice_summary *l)
            l->half_width, l->irregular_regions, l->batches);
 }
 
+static void print_text_remesh(const pliant_remesh_report *r)
+{
+    printf("  remesh       %d base vertices, %d level%s above; %d tried; the aims are %s\n", r->base_vertices, r->levels,
+           r->levels == 1 ? "" : "s", r->tried_count, r->met ? "met" : "missed");
+    printf("               distance %.3f%% of the diagonal (original to mesh), %.3f%% (back); smallest angle %.1f degrees\n",
+           100 * r->fit.there, 100 * r->fit.back, r->fit.smallest_angle);
+    printf("               normals off by %.1f degrees (mean), %.1f (largest); folds up to %.0f degrees; %d flipped\n",
+           r->fit.normal_mean, r->fit.normal_largest, r->fit.fold, r->fit.flipped_count);
+}
+
 static void print_text(const pliant_options *options, const pliant_run_summary *s)
 {
     const pliant_run_times *t = &s->times;
     printf("%s: %d vertices in %d level%s, ", options->output, s->vertex_count, s->level_count,
            s->level_count == 1 ? "" : "s");
+    if (options->product == PLIANT_PRODUCT_MESH) {
+        printf("%d faces, %.2f MB\n", s->face_count, s->file_bytes / 1e6);
+        print_text_remesh(&s->remesh);
+        printf("  seconds      remesh %.2f, write %.2f, total %.2f\n", t->read, t->write, t->total);
+        return;
+    }
     if (options->greens == PLIANT_GREENS_NONE) {
         printf("%d faces, %.2f MB\n", s->face_count, s->file_bytes / 1e6);
         print_text_lattice(&s->lattice);
+        if (options->remeshing == PLIANT_REMESH_FIRST) print_text_remesh(&s->remesh);
         printf("  seconds      read %.2f, lattice %.2f, write %.2f, total %.2f\n", t->read, t->lattice, t->write,
                t->total);
         return;
     }
     printf("%d free, %d held, %.2f MB\n", s->free_count, s->fixed_count, s->file_bytes / 1e6);
+    if (options->remeshing == PLIANT_REMESH_FIRST) print_text_remesh(&s->remesh);
     if (s->detail_steps > 0)
         printf("  detail       %d vertices, %d step%s finer; offsets %.3g (RMS), %.3g (largest), tangential part "
                "%.3g, %.3g\n",
@@ -109,6 +127,15 @@ static void print_json_lattice(const pliant_lattice_summary *l)
            l->components, l->regions, l->irregular_regions, l->batches, l->mass);
 }
 
+static void print_json_remesh(const pliant_remesh_report *r)
+{
+    printf(", \"remesh\": {\"base_vertices\": %d, \"levels\": %d, \"tried\": %d, \"met\": %s, \"distance_there\": %.6g"
+           ", \"distance_back\": %.6g, \"smallest_angle\": %.6g, \"normal_mean\": %.6g, \"normal_largest\": %.6g"
+           ", \"fold\": %.6g, \"flipped\": %d}",
+           r->base_vertices, r->levels, r->tried_count, r->met ? "true" : "false", r->fit.there, r->fit.back,
+           r->fit.smallest_angle, r->fit.normal_mean, r->fit.normal_largest, r->fit.fold, r->fit.flipped_count);
+}
+
 static void print_json(const pliant_options *options, const pliant_run_summary *s)
 {
     const pliant_run_times *t = &s->times;
@@ -119,6 +146,11 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
            s->vertex_count, s->face_count, s->level_count, s->component_count, s->ranks, s->volume,
            s->file_bytes);
     if (options->lattice_cells > 0) print_json_lattice(&s->lattice);
+    if (options->remeshing == PLIANT_REMESH_FIRST) print_json_remesh(&s->remesh);
+    if (options->product == PLIANT_PRODUCT_MESH) {
+        printf(", \"seconds\": {\"remesh\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n", t->read, t->write, t->total);
+        return;
+    }
     if (options->greens == PLIANT_GREENS_NONE) {
         printf(", \"seconds\": {\"read\": %.3f, \"lattice\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n",
                t->read, t->lattice, t->write, t->total);

@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include "mesh/region.h"
+#include "remesh/mesh_output.h"
 
 #include "pliant/error.h"
 #include "pliant/links.h"
@@ -18,6 +19,9 @@ enum {
     OPTION_SUBDIVIDE = 256,
     OPTION_SCHEME,
     OPTION_DETAIL,
+    OPTION_REMESH,
+    OPTION_LEVELS,
+    OPTION_MESH_ONLY,
     OPTION_FIXED,
     OPTION_FIXED_LIST,
     OPTION_YOUNG,
@@ -49,6 +53,9 @@ static const struct option long_options[] = {
     {"subdivide", required_argument, NULL, OPTION_SUBDIVIDE},
     {"scheme", required_argument, NULL, OPTION_SCHEME},
     {"detail", required_argument, NULL, OPTION_DETAIL},
+    {"remesh", required_argument, NULL, OPTION_REMESH},
+    {"levels", required_argument, NULL, OPTION_LEVELS},
+    {"mesh-only", no_argument, NULL, OPTION_MESH_ONLY},
     {"fixed", required_argument, NULL, OPTION_FIXED},
     {"fixed-list", required_argument, NULL, OPTION_FIXED_LIST},
     {"young", required_argument, NULL, OPTION_YOUNG},
@@ -138,6 +145,42 @@ static pliant_status word(const char *option, const char *text, const char *cons
     return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected %s, found '%s'", option, expected, text);
 }
 
+// A number in a range, or "auto".
+static pliant_status number_or_auto(const char *option, const char *text, int32_t low, int32_t high,
+                                    int32_t *value, pliant_error *err)
+{
+    if (strcmp(text, "auto") == 0) {
+        *value = PLIANT_REMESH_AUTO;
+        return PLIANT_OK;
+    }
+    return pliant_option_integer(option, text, low, high, value, err);
+}
+
+// Do --remesh, --levels and --mesh-only go with the rest?
+static pliant_status check_remesh(const pliant_options *o, int levels_given, pliant_error *err)
+{
+    if (o->remeshing == PLIANT_REMESH_NEVER && levels_given)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--levels goes with --remesh BASE_VERTICES");
+    if (o->remeshing == PLIANT_REMESH_FIRST && o->subdivide >= 0)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--remesh makes levels of its own: give --levels instead of --subdivide");
+    if (o->remeshing == PLIANT_REMESH_FIRST && o->fixed_list)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--fixed-list names vertices of MESH, which --remesh replaces: give --fixed EXPR, "
+                                "or remesh with --mesh-only first");
+    if (o->product == PLIANT_PRODUCT_MODEL) return PLIANT_OK;
+    if (o->remeshing == PLIANT_REMESH_NEVER)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--mesh-only goes with --remesh BASE_VERTICES");
+    if (o->lattice_cells > 0 || o->fixed_expression || o->dense)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--mesh-only writes a mesh: --%s is for a model",
+                                o->lattice_cells > 0 ? "lattice" : o->dense ? "dense" : "fixed");
+    if (!pliant_mesh_output_is_known(o->output))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--mesh-only: expected -o with a name that ends in .obj or .ply, found '%s'",
+                                o->output);
+    return PLIANT_OK;
+}
+
 // What an option goes with, so that none is given in vain.
 typedef enum option_kind { KIND_ANY, KIND_GREENS, KIND_LATTICE, KIND_COUNT } option_kind;
 
@@ -181,7 +224,7 @@ static pliant_status check_kinds(const pliant_options *o, const char *const give
     if (o->greens == PLIANT_GREENS_NONE && given[KIND_GREENS])
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s is for Green's functions, --no-greens makes none",
                                 given[KIND_GREENS]);
-    if (o->greens == PLIANT_GREENS_SOLVE && !o->fixed_expression && !o->fixed_list)
+    if (o->product == PLIANT_PRODUCT_MODEL && o->greens == PLIANT_GREENS_SOLVE && !o->fixed_expression && !o->fixed_list)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                                 "nothing holds the solid: give --fixed EXPR (such as 'z<0.1') or --fixed-list "
                                 "FILE%s", o->lattice_cells > 0 ? ", or --no-greens for a lattice only" : "");
@@ -196,6 +239,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
                         .material = {.young = 1, .poisson = 0.3, .density = 1},
                         .wavelet = pliant_wavelet_default(),
                         .constraint_levels = {-1, -1},
+                        .remesh = {PLIANT_REMESH_AUTO, PLIANT_REMESH_AUTO},
                         .half_width = 2};
     static const char *const schemes[] = {"loop", "butterfly", "midpoint"};
     static const char *const wavelets[] = {"linear", "butterfly"};
@@ -203,7 +247,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     static const char *const blocks[] = {"free", "all"};
     static const char *const methods[] = {"bem"};
     pliant_status status = PLIANT_OK;
-    int choice = 0, scheme_given = 0, filling_given = 0;
+    int choice = 0, scheme_given = 0, filling_given = 0, levels_given = 0;
     const char *given[KIND_COUNT] = {NULL};
     *action = PLIANT_OPTIONS_RUN;
     optind = 0;  // starts afresh, so that parsing can be tested in one process
@@ -232,6 +276,15 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             scheme_given = 1;
             break;
         case OPTION_DETAIL: status = pliant_option_integer("--detail", optarg, 1, PLIANT_LEVEL_LIMIT, &o.detail, err); break;
+        case OPTION_REMESH:
+            o.remeshing = PLIANT_REMESH_FIRST;
+            status = number_or_auto("--remesh", optarg, 4, INT32_MAX / 8, &o.remesh.base_vertices, err);
+            break;
+        case OPTION_LEVELS:
+            levels_given = 1;
+            status = number_or_auto("--levels", optarg, 0, PLIANT_LEVEL_LIMIT - 1, &o.remesh.levels, err);
+            break;
+        case OPTION_MESH_ONLY: o.product = PLIANT_PRODUCT_MESH; break;
         case OPTION_WAVELET:
             status = word("--wavelet", optarg, wavelets, 2, &choice, err);
             o.wavelet.scheme = (pliant_wavelet_scheme)choice;
@@ -283,6 +336,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     if (!o.output) return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected -o MODEL.h5; see --help");
     if (o.dense && strcmp(o.dense, o.output) == 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--dense and -o name the same file '%s'", o.dense);
+    if ((status = check_remesh(&o, levels_given, err)) < 0) return status;
     if ((status = check_kinds(&o, given, err)) < 0) return status;
     if (o.fixed_expression) {
         // A mistake in the expression is told before a mesh is read: try it on a mesh of nothing.

@@ -5,6 +5,7 @@
 #include "compression.h"
 #include "lattice/voxels.h"
 #include "mesh/multires.h"
+#include "remesh/remesh.h"
 
 typedef enum pliant_blocks {
     PLIANT_BLOCKS_FREE,  // the free-free block only
@@ -42,10 +43,23 @@ typedef enum pliant_greens_wish {
     PLIANT_GREENS_NONE,  // --no-greens: a lattice only
 } pliant_greens_wish;
 
+typedef enum pliant_remesh_wish {
+    PLIANT_REMESH_NEVER,
+    PLIANT_REMESH_FIRST,  // --remesh: MESH is arbitrary
+} pliant_remesh_wish;
+
+typedef enum pliant_product {
+    PLIANT_PRODUCT_MODEL,
+    PLIANT_PRODUCT_MESH,  // --mesh-only: nothing is solved
+} pliant_product;
+
 typedef struct pliant_options {
     const char *mesh, *output, *dense;  // dense NULL: none
     int32_t subdivide;                  // -1: detect the levels of the mesh
     pliant_subdivision_scheme scheme;
+    pliant_remesh_wish remeshing;
+    pliant_remesh_def remesh;
+    pliant_product product;
     int32_t detail;                     // finest levels that are geometry only
     const char *fixed_expression, *fixed_list;  // either may be NULL
     pliant_material material;

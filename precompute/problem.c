@@ -138,6 +138,7 @@ PetscErrorCode pliant_problem_create(MPI_Comm comm, const pliant_options *option
     p->multires = input.multires;
     p->relief = input.relief;
     p->input_count = input.vertex_count;
+    p->remesh = input.remesh;
     PliantCall(comm, status, err);
     PetscCall(share(comm, rank, &p->multires, &p->held, &input.report, err));
     p->component_count = input.report.component_count;

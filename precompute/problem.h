@@ -12,6 +12,7 @@
 typedef struct pliant_problem {
     pliant_multires *multires;
     pliant_relief *relief;     // --detail: what was taken off the mesh; on the first rank, else NULL
+    pliant_remesh_report remesh;  // what --remesh made; on the first rank
     int32_t input_count;       // vertices of MESH; on the first rank
     pliant_hierarchy *hierarchy;
     int32_t vertex_count;      // n

@@ -7,6 +7,7 @@
 #include "model_output.h"
 #include "node_memory.h"
 #include "provenance.h"
+#include "remesh/mesh_output.h"
 #include "refusal.h"
 #include "right_hand.h"
 
@@ -347,6 +348,7 @@ static pliant_status work_alone(const pliant_options *options, const char *comma
     s->level_count = m->level_count;
     s->component_count = h->input.report.component_count;
     s->volume = pliant_mesh_volume(m->mesh);
+    s->remesh = h->input.remesh;
     status = build_lattice(options, m, h->input.vertex_count, progress, s, h, err);
     if (status < 0) return status;
 
@@ -360,6 +362,29 @@ static pliant_status work_alone(const pliant_options *options, const char *comma
                                         &s->file_bytes, err);
     free(text);
     s->times.write = pliant_progress_end(progress);
+    return status;
+}
+
+// --mesh-only: the first rank's alone.
+static pliant_status work_mesh(const pliant_options *options, pliant_progress *progress,
+                               pliant_run_summary *s, held *h, pliant_error *err)
+{
+    pliant_progress_begin(progress, "remesh", 0);
+    pliant_status status = pliant_input_read(options, progress, &h->input, err);
+    s->times.read = pliant_progress_end(progress);
+    if (status < 0) return status;
+    const pliant_multires *m = h->input.multires;
+    s->vertex_count = m->mesh->vertex_count;
+    s->face_count = m->mesh->face_count;
+    s->level_count = m->level_count;
+    s->component_count = h->input.report.component_count;
+    s->volume = pliant_mesh_volume(m->mesh);
+    s->remesh = h->input.remesh;
+    pliant_progress_begin(progress, "write", 0);
+    status = pliant_mesh_output_write(options->output, m->mesh, err);
+    s->times.write = pliant_progress_end(progress);
+    struct stat written;
+    if (status == PLIANT_OK && stat(options->output, &written) == 0) s->file_bytes = (double)written.st_size;
     return status;
 }
 
@@ -381,6 +406,7 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     s->fixed_count = p->fixed_count;
     s->component_count = p->component_count;
     s->volume = p->volume;
+    s->remesh = p->remesh;
     if (p->relief) {
         s->detail_steps = p->relief->step_count;
         s->detail_vertex_count = p->relief->vertex_count[s->detail_steps];
@@ -478,11 +504,13 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     if (rank == 0) {
         status = check_output(options->output, options->existing, err);
         if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
-        if (status == PLIANT_OK && options->greens == PLIANT_GREENS_NONE)
+        if (status == PLIANT_OK && options->product == PLIANT_PRODUCT_MESH)
+            status = work_mesh(options, progress, summary, &h, err);
+        else if (status == PLIANT_OK && options->greens == PLIANT_GREENS_NONE)
             status = work_alone(options, command_line, progress, summary, &h, err);
     }
     PetscErrorCode code = pliant_refusal_agree(comm, status, err);
-    if (code == 0 && options->greens == PLIANT_GREENS_SOLVE)
+    if (code == 0 && options->product == PLIANT_PRODUCT_MODEL && options->greens == PLIANT_GREENS_SOLVE)
         code = work(comm, options, command_line, progress, summary, &h, err);
     summary->times.total = pliant_progress_clock() - begin;
     if (code == PLIANT_REFUSED) PetscCall(tell_of_partial(comm, h.partial, summary, err));

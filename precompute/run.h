@@ -3,6 +3,7 @@
 
 #include "greens.h"
 #include "lattice_stage.h"
+#include "remesh/remesh.h"
 
 // Seconds of each phase; the order is the program's.
 typedef struct pliant_run_times {
@@ -14,6 +15,7 @@ typedef struct pliant_run_summary {
     int32_t detail_steps, detail_vertex_count;  // 0 without --detail; on the first rank
     pliant_relief_size detail;
     pliant_lattice_summary lattice;  // 0 cells without --lattice; on the first rank
+    pliant_remesh_report remesh;   // 0 base vertices without --remesh; on the first rank
     const char *solver;            // "node" or "scalapack"
     double volume, residual, memory_bytes, file_bytes;
     pliant_level_range levels;  // stored
