@@ -22,6 +22,11 @@ static const double turned_quality = 0.02;
 // middle of its neighbours: more of it draws vertices off limbs, less leaves thin triangles (tried
 // on the bunny's ears: 0, 0.2, 0.5, 1).
 static const double smooth_part = 0.2;
+// Corners and tips that lie farther off the mesh than this, in diagonals, are reached for.
+static const double reached = 0.004;
+// Their faces may be this poor at first: neighbours make room. They leave if it stays under the
+// other.
+static const double reach_quality = 0.15, kept_quality = 0.3;
 // What lies so far off the mesh, in diagonals, counts twice; what lies farther, with the square.
 static const double tolerated = 0.0015;
 
@@ -132,10 +137,12 @@ pliant_status pliant_cover_create(const pliant_coarsening *coarsening,
     c->places = malloc(n * sizeof *c->places);
     c->normals = malloc(3 * n * sizeof *c->normals);
     c->area = calloc(n, sizeof *c->area);
+    c->kept = calloc(n, 1);
     c->centre = calloc(3 * n, sizeof *c->centre);
     c->fan_start = calloc(n + 2, sizeof *c->fan_start);
     c->fans = malloc(3 * (size_t)mesh->face_count * sizeof *c->fans);
-    if (!c->places || !c->normals || !c->area || !c->centre || !c->fan_start || !c->fans) {
+    if (!c->places || !c->normals || !c->area || !c->kept || !c->centre || !c->fan_start ||
+        !c->fans) {
         status = pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory for %d vertices",
                                   mesh->vertex_count);
         goto refused;
@@ -171,6 +178,7 @@ void pliant_cover_destroy(pliant_cover *cover)
     free(cover->fans);
     free(cover->fan_start);
     free(cover->centre);
+    free(cover->kept);
     free(cover->area);
     free(cover->normals);
     free(cover->places);
@@ -231,7 +239,8 @@ static double miss(const pliant_cover *c, int32_t v, const double *x)
 }
 
 // Every vertex's share of the surface: its size and its centre. What the mesh misses weighs more.
-static void weigh_shares(pliant_cover *c, pliant_share *share)
+// Returns the most that it misses, in diagonals.
+static double weigh_shares(pliant_cover *c, pliant_share *share)
 {
     const pliant_mesh *mesh = c->multires->mesh, *fine = c->surface->mesh;
     const size_t n = (size_t)mesh->vertex_count;
@@ -239,11 +248,14 @@ static void weigh_shares(pliant_cover *c, pliant_share *share)
     memset(c->area, 0, n * sizeof *c->area);
     memset(c->centre, 0, 3 * n * sizeof *c->centre);
     const double scale = 1 / (tolerated * tolerated * c->diagonal * c->diagonal);
+    double largest = 0;
     for (int32_t v = 0; v < fine->vertex_count; v++) {
         const int32_t owner = share->owner[v];
         if (owner < 0) continue;
         const double *x = fine->vertices + 3 * (size_t)v;
-        const double weight = share->areas[v] * (1 + miss(c, owner, x) * scale);
+        const double missed = miss(c, owner, x);
+        const double weight = share->areas[v] * (1 + missed * scale);
+        largest = fmax(largest, missed);
         c->area[owner] += weight;
         for (int k = 0; k < 3; k++) c->centre[3 * (size_t)owner + k] += weight * x[k];
     }
@@ -251,15 +263,17 @@ static void weigh_shares(pliant_cover *c, pliant_share *share)
         for (int k = 0; k < 3; k++)
             c->centre[3 * i + k] =
                 c->area[i] > 0 ? c->centre[3 * i + k] / c->area[i] : mesh->vertices[3 * i + k];
+    return sqrt(largest) / c->diagonal;
 }
 
-void pliant_cover_smooth(pliant_cover *cover, pliant_share *share, int32_t sweeps)
+double pliant_cover_smooth(pliant_cover *cover, pliant_share *share, int32_t sweeps)
 {
     pliant_cover *c = cover;
     const int32_t n = c->multires->mesh->vertex_count;
     const double *x = c->multires->mesh->vertices;
+    double missed = 0;
     for (int32_t sweep = 0; sweep < sweeps; sweep++) {
-        weigh_shares(c, share);
+        missed = weigh_shares(c, share);
         double d[3];
         for (int32_t v = 0; v < n; v++) {
             pliant_subtract(c->centre + 3 * (size_t)v, x + 3 * (size_t)v, d);
@@ -272,6 +286,46 @@ void pliant_cover_smooth(pliant_cover *cover, pliant_share *share, int32_t sweep
             for (int k = 0; k < 3; k++) d[k] = smooth_part * (d[k] - x[3 * (size_t)v + k]);
             (void)try_walk(c, v, d);
         }
+    }
+    return missed;
+}
+
+void pliant_cover_reach(pliant_cover *cover, pliant_share *share, int32_t sweeps)
+{
+    pliant_cover *c = cover;
+    const pliant_mesh *mesh = c->multires->mesh, *fine = c->surface->mesh;
+    const double least = reached * reached * c->diagonal * c->diagonal;
+    for (int32_t sweep = 0; sweep < sweeps; sweep++) {
+        pliant_share_out(share, c->places, mesh->vertices, mesh->vertex_count);
+        // The farthest of every share; area holds how far, and centre which.
+        for (int32_t v = 0; v < mesh->vertex_count; v++) {
+            c->area[v] = least;
+            c->centre[3 * (size_t)v] = -1;
+        }
+        for (int32_t v = 0; v < fine->vertex_count; v++) {
+            const int32_t owner = share->owner[v];
+            const double missed = owner < 0 ? 0 : miss(c, owner, fine->vertices + 3 * (size_t)v);
+            if (owner < 0 || !(missed > c->area[owner])) continue;
+            c->area[owner] = missed;
+            c->centre[3 * (size_t)owner] = v;
+        }
+        int32_t moved = 0;
+        for (int32_t v = 0; v < mesh->vertex_count; v++) {
+            const int32_t far = (int32_t)c->centre[3 * (size_t)v];
+            if (far < 0) continue;
+            const pliant_place old = c->places[v];
+            pliant_place at = {.face = share->side[far] / 3};
+            at.weight[share->side[far] % 3] = 1;
+            const double before = quality_around(c, v);
+            place(c, v, &at);
+            if (quality_around(c, v) >= fmin(before, reach_quality)) {
+                c->kept[v] = 1;
+                moved++;
+            } else {
+                place(c, v, &old);
+            }
+        }
+        if (moved == 0) break;
     }
 }
 
@@ -327,9 +381,12 @@ int32_t pliant_cover_improve(pliant_cover *cover, int32_t sweeps)
         int32_t moved = 0;
         for (int32_t i = 0; i < n; i++) {
             const int32_t v = sweep % 2 ? n - 1 - i : i;
-            if (quality_around(c, v) < poor_quality) moved += search(c, v);
+            const double quality = quality_around(c, v);
+            // A kept vertex waits half of the sweeps for its neighbours.
+            if (c->kept[v] && (quality >= kept_quality || 2 * sweep < sweeps)) continue;
+            if (quality < poor_quality) moved += search(c, v);
         }
-        if (moved == 0) break;
+        if (moved == 0 && 2 * sweep >= sweeps) break;
     }
     int32_t poor = 0;
     for (int32_t f = 0; f < c->multires->mesh->face_count; f++)

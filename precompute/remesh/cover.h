@@ -23,6 +23,7 @@ typedef struct pliant_cover {
     const pliant_surface
         *original;  // against whose normals faces are turned, and its tree: while that
     const pliant_face_tree *tree;  // is done, else NULL
+    uint8_t *kept;                 // shape [n], 1: on a corner or a tip
     int32_t *fan_start, *fans;     // faces around each vertex: shape [n + 1] and [3 faces]
 } pliant_cover;
 
@@ -36,8 +37,13 @@ void pliant_cover_destroy(pliant_cover *cover);  // NULL is fine
 
 // Even out, `sweeps` times: a vertex moves to the centre of the part of the surface that is nearest
 // to it, where what the mesh still misses weighs more, and towards its neighbours' middle. `share`
-// is of the same surface.
-void pliant_cover_smooth(pliant_cover *cover, pliant_share *share, int32_t sweeps);
+// is of the same surface. Returns how far, in diagonals, the mesh was from the surface's vertices
+// before the last sweep, about.
+double pliant_cover_smooth(pliant_cover *cover, pliant_share *share, int32_t sweeps);
+
+// Put a vertex on what its share has farthest off the mesh, a corner or a tip, where that spoils no
+// face: after smoothing, since that would round it off again. `share` as before.
+void pliant_cover_reach(pliant_cover *cover, pliant_share *share, int32_t sweeps);
 
 // Improve the worst triangles, one vertex after the other, until that helps no more or `sweeps` are
 // done. Returns how many faces are still poor.

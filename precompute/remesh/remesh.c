@@ -13,6 +13,8 @@
 // faces, and so many for every vertex that is asked for.
 static const double least_faces = 60000, faces_a_vertex = 8;
 static const double most_faces = 4e6;
+// Where one mesh is asked for that is small, so many are enough.
+static const double few_faces = 8000;
 // Bases that are tried, from the smallest: each half as large again.
 enum { FIRST_BASE = 12 };
 static const double base_step = 1.5;
@@ -21,7 +23,15 @@ static const double usual_size = 12000, large_size = 26000;
 enum { AUTO_LEVEL_LIMIT = 6 };
 // Measured distances are samples: stay this much under the aim, and over the angle.
 static const double margin = 0.95;
-enum { SMOOTH_SWEEPS = 20, IMPROVE_SWEEPS = 20, TURN_SWEEPS = 20 };
+// A base whose mesh still misses so much after the first sweeps, in diagonals, is given up.
+static const double hopeless = 0.04;
+enum {
+    FIRST_SWEEPS = 6,
+    SMOOTH_SWEEPS = 20,
+    IMPROVE_SWEEPS = 20,
+    TURN_SWEEPS = 20,
+    REACH_SWEEPS = 3
+};
 
 typedef struct work {
     const pliant_mesh *mesh;
@@ -60,7 +70,8 @@ static pliant_status prepare(work *w, double wanted, pliant_error *err)
     pliant_status status = pliant_surface_create(w->mesh, &w->original, err);
     if (status == PLIANT_OK) status = pliant_face_tree_create(w->mesh, &w->tree, err);
     if (status < 0) return status;
-    const double faces = fmin(fmax(least_faces, faces_a_vertex * wanted), most_faces);
+    const double faces =
+        fmin(fmax(wanted > 0 ? few_faces : least_faces, faces_a_vertex * wanted), most_faces);
     int32_t splits = 0;
     while (ldexp(w->mesh->face_count, 2 * splits) < faces) splits++;
     status = pliant_multires_subdivide(w->mesh, splits, PLIANT_SUBDIVIDE_MIDPOINT, &w->split, err);
@@ -78,7 +89,14 @@ static pliant_status try_base(work *w, int32_t base, int32_t levels, pliant_erro
     pliant_status status =
         pliant_cover_create(w->coarsening, w->surface, base, levels, &cover, err);
     if (status < 0) return status;
-    pliant_cover_smooth(cover, w->share, SMOOTH_SWEEPS);
+    const double missed = pliant_cover_smooth(cover, w->share, FIRST_SWEEPS);
+    if (w->best && missed > hopeless) {
+        w->tried_count++;
+        pliant_cover_destroy(cover);
+        return PLIANT_OK;
+    }
+    (void)pliant_cover_smooth(cover, w->share, SMOOTH_SWEEPS - FIRST_SWEEPS);
+    pliant_cover_reach(cover, w->share, REACH_SWEEPS);
     (void)pliant_cover_improve(cover, IMPROVE_SWEEPS);
     (void)pliant_cover_turn(cover, w->original, w->tree, TURN_SWEEPS);
     status = pliant_fit_measure(w->original, w->tree, cover->multires->mesh, &r.fit, err);

@@ -25,11 +25,12 @@ pliant_status pliant_share_create(const pliant_surface *surface, pliant_share **
         s->lengths = malloc(sides * sizeof *s->lengths);
         s->areas = malloc(n * sizeof *s->areas);
         s->distance = malloc(n * sizeof *s->distance);
+        s->side = malloc(n * sizeof *s->side);
         s->owner = malloc(n * sizeof *s->owner);
         s->heap = malloc(n * sizeof *s->heap);
         s->slot = malloc(n * sizeof *s->slot);
     }
-    if (!s || !s->start || !s->neighbours || !s->lengths || !s->areas || !s->distance ||
+    if (!s || !s->start || !s->neighbours || !s->lengths || !s->areas || !s->side || !s->distance ||
         !s->owner || !s->heap || !s->slot) {
         pliant_share_destroy(s);
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory to share out %d faces",
@@ -43,6 +44,7 @@ pliant_status pliant_share_create(const pliant_surface *surface, pliant_share **
     for (int32_t h = 0; h < (int32_t)sides; h++) {
         const int32_t from = mesh->faces[h], to = mesh->faces[pliant_halfedge_next(h)];
         const int32_t at = s->start[from + 1]++;
+        s->side[from] = h;
         s->neighbours[at] = to;
         s->lengths[at] = sqrt(pliant_squared_distance(mesh->vertices + 3 * (size_t)from,
                                                       mesh->vertices + 3 * (size_t)to));
@@ -57,6 +59,7 @@ void pliant_share_destroy(pliant_share *share)
     free(share->slot);
     free(share->heap);
     free(share->owner);
+    free(share->side);
     free(share->distance);
     free(share->areas);
     free(share->lengths);

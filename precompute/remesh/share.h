@@ -6,6 +6,7 @@
 typedef struct pliant_share {
     const pliant_surface *surface;
     double *areas;   // shape [vertices]: a third of the faces around
+    int32_t *side;   // shape [vertices]: a half-edge of the surface that starts there
     int32_t *owner;  // shape [vertices]: the place to which a vertex belongs; -1 before
     // Its own: neighbours of every vertex, and the front of the search.
     int32_t *start, *neighbours;
