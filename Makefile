@@ -25,6 +25,8 @@ have      = $(shell $(PKG) --exists $(1) 2>/dev/null && echo yes)
 HAVE_HDF5   := $(call have,hdf5-serial)
 HAVE_PETSC  := $(and $(call have,petsc),$(call have,ompi-c),$(call have,hdf5-openmpi),$(call have,assimp),yes)
 HAVE_PNG    := $(call have,libpng)
+# Without .pc files: does their header compile?
+HAVE_FEM    := $(and $(HAVE_PETSC),$(shell printf '\043include <gmshc.h>\n\043include <metis.h>\n' | $(CC) -fsyntax-only -x c - 2>/dev/null && echo yes))
 HAVE_CMOCKA := $(call have,cmocka)
 
 WARNINGS := -Wall -Wextra -Wpedantic -Wshadow -Wstrict-prototypes -Wmissing-prototypes
@@ -47,6 +49,8 @@ MPI_LIBS     := $(if $(HAVE_PETSC),$(shell $(PKG) --libs ompi-c))
 PHDF5_CFLAGS := $(if $(HAVE_PETSC),$(patsubst -I%,-isystem %,$(shell $(PKG) --cflags hdf5-openmpi)))
 ASSIMP_CFLAGS := $(if $(HAVE_PETSC),$(patsubst -I%,-isystem %,$(shell $(PKG) --cflags assimp)))
 ASSIMP_LIBS  := $(if $(HAVE_PETSC),$(shell $(PKG) --libs assimp))
+FEM_CFLAGS   := $(if $(HAVE_FEM),,-DPLIANT_WITHOUT_FEM)
+FEM_LIBS     := $(if $(HAVE_FEM),-lmetis -ldl)
 PNG_CFLAGS   := $(if $(HAVE_PNG),$(shell $(PKG) --cflags libpng))
 PNG_LIBS     := $(if $(HAVE_PNG),$(shell $(PKG) --libs libpng))
 CMOCKA_LIBS  := $(if $(HAVE_CMOCKA),$(shell $(PKG) --libs cmocka))
@@ -94,6 +98,9 @@ PROGRAMS += $(OUT)/pliant-precompute
 else
 SKIPPED += pliant-precompute(needs petsc-dev libopenmpi-dev libhdf5-openmpi-dev libassimp-dev)
 endif
+ifeq ($(HAVE_PETSC)$(HAVE_FEM),yes)
+SKIPPED += pliant-precompute--method-fem(needs libgmsh-dev libmetis-dev)
+endif
 ifeq ($(HAVE_PNG),yes)
 PROGRAMS += $(OUT)/pliant-draw
 else
@@ -120,6 +127,7 @@ configure:  ## what was found on this machine
 	@echo "flavour    BUILD=$(BUILD) -> $(OUT)"
 	@echo "hdf5       $(or $(HAVE_HDF5),no)"
 	@echo "petsc etc. $(or $(HAVE_PETSC),no)"
+	@echo "gmsh metis $(or $(HAVE_FEM),no)"
 	@echo "libpng     $(or $(HAVE_PNG),no)"
 	@echo "cmocka     $(or $(HAVE_CMOCKA),no)"
 
@@ -132,7 +140,7 @@ clean:  ## remove build/
 # ---- Compile: flags are a prerequisite, so changed flags rebuild ----
 
 FLAGS_STAMP := $(OBJ)/flags
-FLAGS_TEXT  := $(CC) $(ALL_CFLAGS) $(HDF5_CFLAGS) $(PETSC_CFLAGS)
+FLAGS_TEXT  := $(CC) $(ALL_CFLAGS) $(HDF5_CFLAGS) $(PETSC_CFLAGS) $(FEM_CFLAGS)
 $(shell mkdir -p $(OBJ); printf '%s\n' '$(FLAGS_TEXT)' | cmp -s - $(FLAGS_STAMP) || printf '%s\n' '$(FLAGS_TEXT)' > $(FLAGS_STAMP))
 
 # The revision goes into files: a new one recompiles its only user.
@@ -157,6 +165,8 @@ $(OBJ)/precompute/remesh/%.o: precompute/remesh/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_precompute))
 $(OBJ)/precompute/lattice/%.o: precompute/lattice/%.c $(FLAGS_STAMP)
 	$(call compile,$(I_precompute))
+$(OBJ)/precompute/fem/%.o: precompute/fem/%.c $(FLAGS_STAMP)
+	$(call compile,$(I_precompute) $(PETSC_CFLAGS) $(FEM_CFLAGS))
 $(OBJ)/precompute/provenance.o: precompute/provenance.c $(FLAGS_STAMP) $(REVISION_STAMP)
 	$(call compile,$(I_precompute) $(PETSC_CFLAGS) $(PHDF5_CFLAGS) -DPLIANT_REVISION='"$(REVISION)"')
 $(OBJ)/precompute/%.o: precompute/%.c $(FLAGS_STAMP)
@@ -203,7 +213,7 @@ $(SO_pliant): $(call objects,$(SRC_runtime) $(SRC_common) $(SRC_formats)) | runt
 
 program = @mkdir -p $(@D); echo "  link $@"; $(CC) $(LINK) -o $@ $(filter %.o %.a,$^)
 $(OUT)/pliant-precompute: $(OBJ)/precompute/main.o $(LIB_precompute) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
-	$(program) $(ASSIMP_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm
+	$(program) $(ASSIMP_LIBS) $(FEM_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm
 $(OUT)/pliant-play: $(OBJ)/runtime/play/main.o $(LIB_play) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(HDF5_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/pliant-info: $(OBJ)/runtime/info/main.o $(LIB_info) $(LIB_pliant)
@@ -227,6 +237,9 @@ endif
 ifeq ($(BUILD),tsan)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif
+ifneq ($(HAVE_FEM),yes)
+TEST_SRC  := $(filter-out tests/precompute/test_fem_% tests/programs/test_precompute_fem.c,$(TEST_SRC))
+endif
 ifneq ($(HAVE_PNG),yes)
 TEST_SRC  := $(filter-out $(addprefix tests/runtime/test_,draw.c raster.c camera.c colour_map.c) tests/lattice/test_scene_drawing.c,$(TEST_SRC))
 endif
@@ -239,7 +252,7 @@ BENCHES   := $(patsubst tests/%.c,$(OUT)/tests/%,$(BENCH_SRC))
 
 TEST_LIBS := $(LIB_support) $(if $(HAVE_PNG),$(LIB_draw)) $(LIB_play) $(LIB_info) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 $(OUT)/tests/precompute/%: $(OBJ)/tests/precompute/%.o $(LIB_support) $(LIB_precompute) $(LIB_pliant) $(LIB_phdf5) $(LIB_formats) $(LIB_common)
-	$(program) $(CMOCKA_LIBS) $(ASSIMP_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm -lpthread
+	$(program) $(CMOCKA_LIBS) $(ASSIMP_LIBS) $(FEM_LIBS) $(PETSC_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/bench/%: $(OBJ)/tests/bench/%.o $(LIB_support) $(if $(HAVE_PETSC),$(LIB_precompute)) $(LIB_pliant) $(LIB_hdf5) $(LIB_formats) $(LIB_common)
 	$(program) $(CMOCKA_LIBS) $(HDF5_LIBS) $(ASSIMP_LIBS) $(MPI_LIBS) $(LAPACK_LIBS) -lm -lpthread
 $(OUT)/tests/%: $(OBJ)/tests/%.o $(TEST_LIBS)

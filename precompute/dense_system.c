@@ -23,11 +23,6 @@ struct pliant_dense_system {
     double *received, *whole;    // scalapack: columns as they arrive, and whole
 };
 
-static int32_t split(int64_t count, int rank, int size)
-{
-    return (int32_t)(count * rank / size);
-}
-
 // A batch needs no more room than there are columns; gravity is one.
 static int32_t at_once(int32_t columns, int32_t batch)
 {
@@ -83,8 +78,8 @@ PetscErrorCode pliant_dense_system_create(MPI_Comm comm, int32_t n, int32_t colu
     s->matrix.file = s->right.file = s->solution.file = -1;
     PetscCallMPI(MPI_Comm_rank(comm, &s->rank));
     PetscCallMPI(MPI_Comm_size(comm, &s->size));
-    s->row_begin = split(n, s->rank, s->size);
-    s->row_end = split(n, s->rank + 1, s->size);
+    s->row_begin = pliant_column_split(n, s->rank, s->size);
+    s->row_end = pliant_column_split(n, s->rank + 1, s->size);
     PetscCall(choose_kind(comm, n, &s->kind));
 
     const size_t rows = 3 * (size_t)n, own_rows = 3 * (size_t)(s->row_end - s->row_begin);
@@ -271,13 +266,13 @@ static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const double *s
     PetscCall(PetscMalloc1(4 * (size_t)s->size, &counts));
     PetscMPIInt *send = counts, *send_at = send + s->size, *receive = send_at + s->size,
                 *receive_at = receive + s->size;
-    const int32_t own = split(count, s->rank + 1, s->size) - split(count, s->rank, s->size);
+    const int32_t own = pliant_column_split(count, s->rank + 1, s->size) - pliant_column_split(count, s->rank, s->size);
     PetscMPIInt *all_rows;
     PetscCall(PetscMalloc1(s->size, &all_rows));
     PetscMPIInt mine = (PetscMPIInt)local_rows;
     PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, all_rows, 1, MPI_INT, s->comm));
     for (int r = 0, out = 0, in = 0; r < s->size; r++) {
-        send[r] = mine * 3 * (split(count, r + 1, s->size) - split(count, r, s->size));
+        send[r] = mine * 3 * (pliant_column_split(count, r + 1, s->size) - pliant_column_split(count, r, s->size));
         receive[r] = all_rows[r] * 3 * own;
         send_at[r] = out, receive_at[r] = in;
         out += send[r], in += receive[r];
@@ -300,11 +295,11 @@ static PetscErrorCode solve_by_scalapack(pliant_dense_system *s, const double *s
 
 // Collective: `source` is this rank's rows of three right-hand sides for each of `count` columns.
 static PetscErrorCode solve(pliant_dense_system *s, const double *source, int32_t count,
-                            pliant_dense_share *share)
+                            pliant_column_share *share)
 {
     PetscFunctionBegin;
-    share->begin = split(count, s->rank, s->size);
-    share->end = split(count, s->rank + 1, s->size);
+    share->begin = pliant_column_split(count, s->rank, s->size);
+    share->end = pliant_column_split(count, s->rank + 1, s->size);
     share->ld = 3 * (size_t)s->n;
     if (s->kind == NODE) {
         PetscCall(solve_on_node(s, source, count));
@@ -317,7 +312,7 @@ static PetscErrorCode solve(pliant_dense_system *s, const double *source, int32_
 }
 
 PetscErrorCode pliant_dense_system_solve(pliant_dense_system *s, int32_t first, int32_t count,
-                                         pliant_dense_share *share)
+                                         pliant_column_share *share)
 {
     PetscFunctionBegin;
     PetscCheck(count <= s->batch, s->comm, PETSC_ERR_ARG_SIZ, "batch of %d columns, room for %d",
@@ -328,7 +323,7 @@ PetscErrorCode pliant_dense_system_solve(pliant_dense_system *s, int32_t first, 
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *s, pliant_dense_share *share)
+PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *s, pliant_column_share *share)
 {
     PetscFunctionBegin;
     PetscCall(solve(s, s->gravity, 1, share));

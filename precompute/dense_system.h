@@ -12,6 +12,8 @@
 // PETSC_OPTIONS="-pliant_dense scalapack" (or node) overrules the choice.
 #pragma once
 
+#include "discretisation.h"
+
 #include <petscsys.h>
 
 #include <stddef.h>
@@ -51,15 +53,8 @@ PetscErrorCode pliant_dense_system_estimate(const pliant_dense_system *system, d
 // Collective: LU with partial pivoting in place of A. *singular is 1 when a pivot vanished.
 PetscErrorCode pliant_dense_system_factor(pliant_dense_system *system, int *singular);
 
-// Whole columns of Xi, on the rank that goes on with them. Borrowed until the next solve.
-typedef struct pliant_dense_share {
-    int32_t begin, end;     // columns of the batch, from 0, that are this rank's
-    const double *columns;  // [end - begin] times 3 columns of 3n values, leading dimension ld
-    size_t ld;
-} pliant_dense_share;
-
 // Collective: solve for columns first .. first + count - 1 (count <= batch).
 PetscErrorCode pliant_dense_system_solve(pliant_dense_system *system, int32_t first, int32_t count,
-                                         pliant_dense_share *share);
+                                         pliant_column_share *share);
 // Collective: solve for the three gravity columns.
-PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *system, pliant_dense_share *share);
+PetscErrorCode pliant_dense_system_solve_gravity(pliant_dense_system *system, pliant_column_share *share);

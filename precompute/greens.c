@@ -233,31 +233,10 @@ static pliant_status compress(pliant_greens *g, int fixed_columns, int32_t posit
     return PLIANT_OK;
 }
 
-// Test a solved column against the kept rows: the backward error |A_s x - b_s| / (|A_s| |x| + |b_s|),
-// with absolute values taken entry by entry, which scaling columns does not change; the largest.
-static double sample_residual(const pliant_sample_row *sample, int32_t n, int32_t column,
-                              const double *columns, size_t ld)
-{
-    double worst = 0;
-    for (size_t j = 0; sample->vertex >= 0 && j < 3; j++) {
-        const double *x = columns + j * ld, *b = sample->right + 3 * (3 * (size_t)column + j);
-        for (int r = 0; r < 3; r++) {
-            double residual = -b[r], size = fabs(b[r]);
-            for (size_t u = 0; u < 3 * (size_t)n; u++) {
-                const double term = sample->A[3 * u + r] * x[u];
-                residual += term;
-                size += fabs(term);
-            }
-            worst = fmax(worst, size > 0 ? fabs(residual) / size : 0);
-        }
-    }
-    return worst;
-}
-
 // Columns of one domain, which are those from `before` on of the system's.
-static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system, int fixed_columns,
-                                   int32_t before, const pliant_sample_row *sample,
-                                   pliant_dense_output *dense, pliant_progress *progress, pliant_error *err)
+static PetscErrorCode solve_domain(pliant_greens *g, const pliant_discretisation *method, void *system,
+                                   int fixed_columns, int32_t before, pliant_dense_output *dense,
+                                   pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
     const pliant_problem *p = g->problem;
@@ -267,18 +246,18 @@ static PetscErrorCode solve_domain(pliant_greens *g, pliant_dense_system *system
     for (int32_t first = g->partial ? pliant_partial_done(g->partial, domain) : 0; first < columns;
          first += g->batch) {
         const int32_t count = columns - first < g->batch ? columns - first : g->batch;
-        pliant_dense_share share;
+        pliant_column_share share;
         const double begin = pliant_progress_clock();
-        PetscCall(pliant_dense_system_solve(system, before + first, count, &share));
+        PetscCall(method->solve(system, before + first, count, &share, err));
         const double solved = pliant_progress_clock();
         g->solve_seconds += solved - begin;
 
+        double worst, bound;
+        PetscCall(method->residual(system, &worst, &bound));
+        g->residual = fmax(g->residual, worst);
+
         const int32_t mine = share.end - share.begin, position = first + share.begin;
         PliantCall(g->comm, compress(g, fixed_columns, position, mine, share.columns, share.ld, err), err);
-        // One column of every batch is enough to notice a bad factorization.
-        if (mine > 0)
-            g->residual = fmax(g->residual, sample_residual(sample, p->vertex_count, before + position,
-                                                            share.columns, share.ld));
         if (dense)
             PetscCall(pliant_dense_output_add(
                 dense, fixed_columns ? PLIANT_DENSE_FIXED : PLIANT_DENSE_FREE, position, mine,
@@ -305,7 +284,7 @@ static void transform_gravity(const pliant_wavelet *wavelet, const int32_t *node
 }
 
 // The three body-force columns, transformed but not thresholded, on every rank.
-static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *system,
+static PetscErrorCode solve_gravity(pliant_greens *g, const pliant_discretisation *method, void *system,
                                     pliant_dense_output *dense, pliant_error *err)
 {
     PetscFunctionBegin;
@@ -313,8 +292,8 @@ static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *syste
     PetscMPIInt rank, size;
     PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
     PetscCallMPI(MPI_Comm_size(g->comm, &size));
-    pliant_dense_share share;
-    PetscCall(pliant_dense_system_solve_gravity(system, &share));
+    pliant_column_share share;
+    PetscCall(method->solve_gravity(system, &share, err));
     const int32_t most = p->free_count > p->fixed_count ? p->free_count : p->fixed_count;
     const int mine = share.end > share.begin;
     double *x;
@@ -344,9 +323,8 @@ static PetscErrorCode solve_gravity(pliant_greens *g, pliant_dense_system *syste
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_greens_solve(pliant_greens *g, pliant_dense_system *system,
-                                   const pliant_sample_row *sample, pliant_dense_output *dense,
-                                   pliant_progress *progress, pliant_error *err)
+PetscErrorCode pliant_greens_solve(pliant_greens *g, const pliant_discretisation *method, void *system,
+                                   pliant_dense_output *dense, pliant_progress *progress, pliant_error *err)
 {
     PetscFunctionBegin;
     const int32_t level = g->problem->levels.last;
@@ -358,9 +336,9 @@ PetscErrorCode pliant_greens_solve(pliant_greens *g, pliant_dense_system *system
     pliant_progress_begin_at(
         progress, "solve", done,
         pliant_right_hand_count(g->problem, all ? PLIANT_BLOCKS_ALL : PLIANT_BLOCKS_FREE));
-    PetscCall(solve_domain(g, system, 0, 0, sample, dense, progress, err));
-    if (all) PetscCall(solve_domain(g, system, 1, free_columns, sample, dense, progress, err));
-    if (!g->has_gravity) PetscCall(solve_gravity(g, system, dense, err));
+    PetscCall(solve_domain(g, method, system, 0, 0, dense, progress, err));
+    if (all) PetscCall(solve_domain(g, method, system, 1, free_columns, dense, progress, err));
+    if (!g->has_gravity) PetscCall(solve_gravity(g, method, system, dense, err));
     double worst;
     PetscCallMPI(MPI_Allreduce(&g->residual, &worst, 1, MPI_DOUBLE, MPI_MAX, g->comm));
     g->residual = worst;

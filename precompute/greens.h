@@ -3,8 +3,8 @@
 #pragma once
 
 #include "compression.h"
-#include "dense_system.h"
 #include "dense_output.h"
+#include "discretisation.h"
 #include "partial.h"
 #include "problem.h"
 
@@ -56,17 +56,10 @@ PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem
                                     pliant_error *err);
 PetscErrorCode pliant_greens_destroy(pliant_greens **greens);
 
-// A row of the system kept from before the factorization, against which solutions are tested.
-typedef struct pliant_sample_row {
-    int32_t vertex;  // -1: this rank has none
-    double *A;       // [3n][3]: three rows, column by column
-    double *right;   // [3 columns][3]: the right-hand sides' rows
-} pliant_sample_row;
-
 // Collective: solve those columns of the finest level asked for that are not there yet. `dense` may
-// be NULL, and `system` when the partial data is whole.
-PetscErrorCode pliant_greens_solve(pliant_greens *greens, pliant_dense_system *system,
-                                   const pliant_sample_row *sample, pliant_dense_output *dense,
+// be NULL. When the partial data is whole, `system` is only asked for its residual's bound.
+PetscErrorCode pliant_greens_solve(pliant_greens *greens, const pliant_discretisation *method,
+                                   void *system, pliant_dense_output *dense,
                                    pliant_progress *progress, pliant_error *err);
 // Collective: choose what is kept, level by level: each coarser one refined from the next finer.
 PetscErrorCode pliant_greens_compress(pliant_greens *greens, pliant_progress *progress,

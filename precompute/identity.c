@@ -12,12 +12,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { TEXT_SIZE = 4096 };
+enum { TEXT_SIZE = 16384 };
 
 static pliant_status hash_file(const char *path, uint64_t *hash, pliant_error *err)
 {
     FILE *file = fopen(path, "rb");
-    if (!file) return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: %s", path, strerror(errno));
+    if (!file)
+        return pliant_error_set(err, PLIANT_ERR_IO, "%.400s: cannot be opened: %s", path,
+                                strerror(errno));
     char block[1 << 14];
     *hash = 0;
     for (size_t count; (count = fread(block, 1, sizeof block, file)) > 0;)
@@ -30,17 +32,25 @@ static pliant_status hash_file(const char *path, uint64_t *hash, pliant_error *e
 
 // One a line, in the order in which a difference is worth telling.
 static void print(FILE *out, const pliant_options *o, const pliant_problem *p, uint64_t mesh,
-                  uint64_t densities)
+                  uint64_t densities, uint64_t volume)
 {
     fprintf(out, "version = %s (%s)\n", PLIANT_VERSION_TEXT, pliant_provenance_revision());
     fprintf(out, "mesh contents = %016llx\n", (unsigned long long)mesh);
     fprintf(out, "--subdivide = %d\n--scheme = %d\n--detail = %d\n", o->subdivide, (int)o->scheme,
             o->detail);
+    fprintf(out, "--remesh = %d (%d, %d levels)\n", (int)o->remeshing, o->remesh.base_vertices,
+            o->remesh.levels);
     fprintf(out, "vertices = %d\n", p->vertex_count);
     fprintf(out, "held vertices = %d (%016llx)\n", p->fixed_count,
             (unsigned long long)pliant_checksum(0, p->held, (size_t)p->vertex_count));
     fprintf(out, "--young = %.17g\n--poisson = %.17g\n--density = %.17g\n", o->material.young,
             o->material.poisson, o->material.density);
+    fprintf(out, "--method = %d\n--order = %d\n--solver = %d\n--volume contents = %016llx\n",
+            (int)o->method, o->order, (int)o->solver, (unsigned long long)volume);
+    for (int32_t k = 0; k < o->region_count; k++)
+        fprintf(out, "--material %s = %.17g:%.17g:%.17g\n", o->regions[k].name,
+                o->regions[k].material.young, o->regions[k].material.poisson,
+                o->regions[k].material.density);
     fprintf(out, "--rms = %.17g\n--max = %.17g\n--eps = %.17g\n", o->compression.rms,
             o->compression.max, o->compression.eps);
     fprintf(out, "--wavelet = %d\n--no-lift = %d\n--boundary = %d\n", (int)o->wavelet.scheme,
@@ -55,10 +65,11 @@ static void print(FILE *out, const pliant_options *o, const pliant_problem *p, u
 pliant_status pliant_identity_create(const pliant_options *options, const pliant_problem *problem,
                                      char **text, pliant_error *err)
 {
-    uint64_t mesh, densities = 0;
+    uint64_t mesh, densities = 0, volume = 0;
     pliant_status status = hash_file(options->mesh, &mesh, err);
     if (status == PLIANT_OK && options->lattice_mass)
         status = hash_file(options->lattice_mass, &densities, err);
+    if (status == PLIANT_OK && options->volume) status = hash_file(options->volume, &volume, err);
     if (status < 0) return status;
     char *lines = calloc(TEXT_SIZE, 1);
     FILE *out = lines ? fmemopen(lines, TEXT_SIZE, "w") : NULL;
@@ -66,7 +77,7 @@ pliant_status pliant_identity_create(const pliant_options *options, const pliant
         free(lines);
         return pliant_error_set(err, PLIANT_ERR_MEMORY, "no memory to tell runs apart");
     }
-    print(out, options, problem, mesh, densities);
+    print(out, options, problem, mesh, densities, volume);
     fclose(out);
     *text = lines;
     return PLIANT_OK;

@@ -28,6 +28,10 @@ enum {
     OPTION_POISSON,
     OPTION_DENSITY,
     OPTION_METHOD,
+    OPTION_VOLUME,
+    OPTION_ORDER,
+    OPTION_SOLVER,
+    OPTION_MATERIAL,
     OPTION_RMS,
     OPTION_MAX,
     OPTION_EPS,
@@ -62,6 +66,10 @@ static const struct option long_options[] = {
     {"poisson", required_argument, NULL, OPTION_POISSON},
     {"density", required_argument, NULL, OPTION_DENSITY},
     {"method", required_argument, NULL, OPTION_METHOD},
+    {"volume", required_argument, NULL, OPTION_VOLUME},
+    {"order", required_argument, NULL, OPTION_ORDER},
+    {"solver", required_argument, NULL, OPTION_SOLVER},
+    {"material", required_argument, NULL, OPTION_MATERIAL},
     {"rms", required_argument, NULL, OPTION_RMS},
     {"max", required_argument, NULL, OPTION_MAX},
     {"eps", required_argument, NULL, OPTION_EPS},
@@ -182,7 +190,7 @@ static pliant_status check_remesh(const pliant_options *o, int levels_given, pli
 }
 
 // What an option goes with, so that none is given in vain.
-typedef enum option_kind { KIND_ANY, KIND_GREENS, KIND_LATTICE, KIND_COUNT } option_kind;
+typedef enum option_kind { KIND_ANY, KIND_GREENS, KIND_FEM, KIND_LATTICE, KIND_COUNT } option_kind;
 
 static option_kind kind_of(int code)
 {
@@ -199,6 +207,10 @@ static option_kind kind_of(int code)
     case OPTION_BLOCKS:
     case OPTION_RESUME:
     case OPTION_DENSE: return KIND_GREENS;
+    case OPTION_VOLUME:
+    case OPTION_ORDER:
+    case OPTION_SOLVER:
+    case OPTION_MATERIAL: return KIND_FEM;
     case OPTION_HALF_WIDTH:
     case OPTION_SOLID:
     case OPTION_SHELL:
@@ -221,6 +233,11 @@ static pliant_status check_kinds(const pliant_options *o, const char *const give
 {
     if (o->lattice_cells == 0 && given[KIND_LATTICE])
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s goes with --lattice CELLS", given[KIND_LATTICE]);
+    if (o->method != PLIANT_METHOD_FEM && given[KIND_FEM])
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s goes with --method fem", given[KIND_FEM]);
+    if (o->region_count > 0 && !o->volume)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "--material goes with --volume FILE.msh, whose regions it names");
     if (o->greens == PLIANT_GREENS_NONE && given[KIND_GREENS])
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--%s is for Green's functions, --no-greens makes none",
                                 given[KIND_GREENS]);
@@ -229,6 +246,36 @@ static pliant_status check_kinds(const pliant_options *o, const char *const give
                                 "nothing holds the solid: give --fixed EXPR (such as 'z<0.1') or --fixed-list "
                                 "FILE%s", o->lattice_cells > 0 ? ", or --no-greens for a lattice only" : "");
     return PLIANT_OK;
+}
+
+// NAME:E:NU:RHO.
+static pliant_status region_material(const char *text, pliant_options *o, pliant_error *err)
+{
+    const char *option = "--material";
+    if (o->region_count == PLIANT_REGION_LIMIT)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected at most %d of them", option, PLIANT_REGION_LIMIT);
+    pliant_region_option *region = &o->regions[o->region_count];
+    char parts[4][PLIANT_REGION_NAME];
+    int count = 0;
+    const char *begin = text;
+    for (size_t length; count < 4; begin += length + 1, count++) {
+        length = strcspn(begin, ":");
+        if (length == 0 || length >= PLIANT_REGION_NAME || (count < 3) != (begin[length] == ':')) break;
+        memcpy(parts[count], begin, length);
+        parts[count][length] = 0;
+    }
+    if (count != 4)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "%s: expected NAME:E:NU:RHO, such as bone:1e9:0.3:1800, found '%.80s'", option, text);
+    for (int32_t k = 0; k < o->region_count; k++)
+        if (strcmp(o->regions[k].name, parts[0]) == 0)
+            return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: '%s' is given twice", option, parts[0]);
+    memcpy(region->name, parts[0], sizeof region->name);
+    pliant_status status = number(option, parts[1], 0, INFINITY, &region->material.young, err);
+    if (status == PLIANT_OK) status = number(option, parts[2], -1, 0.5, &region->material.poisson, err);
+    if (status == PLIANT_OK) status = number(option, parts[3], 0, INFINITY, &region->material.density, err);
+    if (status == PLIANT_OK) o->region_count++;
+    return status;
 }
 
 pliant_status pliant_options_parse(int argc, char **argv, pliant_options *options,
@@ -240,12 +287,14 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
                         .wavelet = pliant_wavelet_default(),
                         .constraint_levels = {-1, -1},
                         .remesh = {PLIANT_REMESH_AUTO, PLIANT_REMESH_AUTO},
+                        .order = 2,
                         .half_width = 2};
     static const char *const schemes[] = {"loop", "butterfly", "midpoint"};
     static const char *const wavelets[] = {"linear", "butterfly"};
     static const char *const boundaries[] = {"zero", "drop"};
     static const char *const blocks[] = {"free", "all"};
-    static const char *const methods[] = {"bem"};
+    static const char *const methods[] = {"bem", "fem"};
+    static const char *const solvers[] = {"auto", "direct", "multigrid"};
     pliant_status status = PLIANT_OK;
     int choice = 0, scheme_given = 0, filling_given = 0, levels_given = 0;
     const char *given[KIND_COUNT] = {NULL};
@@ -316,7 +365,17 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             break;
         case OPTION_LATTICE_MASS: o.lattice_mass = optarg; break;
         case OPTION_NO_GREENS: o.greens = PLIANT_GREENS_NONE; break;
-        case OPTION_METHOD: status = word("--method", optarg, methods, 1, &choice, err); break;
+        case OPTION_METHOD:
+            status = word("--method", optarg, methods, 2, &choice, err);
+            o.method = (pliant_method)choice;
+            break;
+        case OPTION_VOLUME: o.volume = optarg; break;
+        case OPTION_ORDER: status = pliant_option_integer("--order", optarg, 1, 2, &o.order, err); break;
+        case OPTION_SOLVER:
+            status = word("--solver", optarg, solvers, 3, &choice, err);
+            o.solver = (pliant_solver_choice)choice;
+            break;
+        case OPTION_MATERIAL: status = region_material(optarg, &o, err); break;
         case OPTION_YOUNG: status = number("--young", optarg, 0, INFINITY, &o.material.young, err); break;
         case OPTION_POISSON: status = number("--poisson", optarg, -1, 0.5, &o.material.poisson, err); break;
         case OPTION_DENSITY: status = number("--density", optarg, 0, INFINITY, &o.material.density, err); break;

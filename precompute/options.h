@@ -1,11 +1,30 @@
 // options.h: what the command line of pliant-precompute asks for.
 #pragma once
 
-#include "bem/bem.h"
 #include "compression.h"
 #include "lattice/voxels.h"
+#include "material.h"
 #include "mesh/multires.h"
 #include "remesh/remesh.h"
+
+typedef enum pliant_method {
+    PLIANT_METHOD_BEM,  // boundary elements
+    PLIANT_METHOD_FEM,  // finite elements
+} pliant_method;
+
+typedef enum pliant_solver_choice {  // of finite elements
+    PLIANT_SOLVER_AUTO,              // direct while it fits in memory
+    PLIANT_SOLVER_DIRECT,
+    PLIANT_SOLVER_MULTIGRID,
+} pliant_solver_choice;
+
+enum { PLIANT_REGION_LIMIT = 64, PLIANT_REGION_NAME = 64 };
+
+// --material NAME:E:NU:RHO: the physical volume NAME of --volume has this material.
+typedef struct pliant_region_option {
+    char name[PLIANT_REGION_NAME];
+    pliant_material material;
+} pliant_region_option;
 
 typedef enum pliant_blocks {
     PLIANT_BLOCKS_FREE,  // the free-free block only
@@ -62,6 +81,12 @@ typedef struct pliant_options {
     pliant_product product;
     int32_t detail;                     // finest levels that are geometry only
     const char *fixed_expression, *fixed_list;  // either may be NULL
+    pliant_method method;
+    const char *volume;            // a Gmsh file; NULL: the inside is meshed
+    int32_t order;                 // of tetrahedra, 1 or 2
+    pliant_solver_choice solver;
+    int32_t region_count;
+    pliant_region_option regions[PLIANT_REGION_LIMIT];
     pliant_material material;
     pliant_wavelet_def wavelet;
     pliant_compression_def compression;

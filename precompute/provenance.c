@@ -1,6 +1,8 @@
 // provenance.c: what a model file says of its making: "key = value" lines.
 #include "provenance.h"
 
+#include "discretisation.h"
+
 #include <hdf5.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,7 +52,7 @@ static void print_run(FILE *out, const pliant_run_summary *s, const pliant_mesh 
 static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_options *options)
 {
     fprintf(out,
-            "method = bem\n"
+            "method = %s\n"
             "solver = %s\n"
             "constraint_levels = %d..%d\n"
             "asked_eps = %.9g\n"
@@ -65,7 +67,7 @@ static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_op
             "seconds_solve = %.3f\n"
             "seconds_transform = %.3f\n"
             "seconds_compress = %.3f\n",
-            s->solver, s->levels.first, s->levels.last, options->compression.eps,
+            pliant_discretisation_of(options->method)->name, s->solver, s->levels.first, s->levels.last, options->compression.eps,
             options->compression.rms, options->compression.max, s->detail_steps, s->detail.rms,
             s->detail.tangential_rms, s->residual, s->times.assemble, s->times.factor,
             s->times.solve, s->times.transform, s->times.compress);

@@ -1,6 +1,7 @@
 // run.c: one precomputation from its options to its file.
 #include "run.h"
 
+#include "discretisation.h"
 #include "identity.h"
 #include "input.h"
 #include "interruption.h"
@@ -20,11 +21,6 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
-
-// The backward error of sampled rows may be this large before it is an error: LU with partial pivoting
-// stays near 1e-15 (measured on the sample and the evaluation meshes) unless the growth of its
-// elements spoils it.
-static const double residual_bound = 1e-10;
 
 // ---- Before the work: can it end well? ----
 
@@ -80,9 +76,10 @@ static pliant_status check_levels(const pliant_problem *p, const pliant_options 
 
 // Collective: state what the run will take, and refuse what cannot fit.
 static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
-                                  const pliant_options *options, const char *folder,
-                                  const pliant_partial *partial, pliant_progress *progress,
-                                  pliant_run_summary *summary, pliant_error *err)
+                                  const pliant_options *options, const pliant_solve_plan *plan,
+                                  const char *folder, const pliant_partial *partial,
+                                  pliant_progress *progress, pliant_run_summary *summary,
+                                  pliant_error *err)
 {
     PetscFunctionBegin;
     PetscMPIInt size, node_size;
@@ -91,11 +88,7 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
 
     const pliant_level_range levels = p->levels;
     const int32_t solved = pliant_right_hand_count(p, options->blocks);
-    pliant_dense_plan plan;
-    PetscCall(pliant_dense_system_plan(comm, p->vertex_count, solved, pliant_greens_batch(comm), &plan));
-    summary->solver = plan.kind;
-    if (partial && pliant_partial_is_whole(partial))
-        plan.matrix_bytes = plan.right_hand_bytes = plan.batch_bytes = 0;
+    summary->solver = plan->solver;
     const int all = options->blocks == PLIANT_BLOCKS_ALL;
     const double rows = all ? p->vertex_count : p->free_count;
     double stored = 0;  // columns of all levels
@@ -106,7 +99,7 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     const double work = 5.0 * rows * 9 * PLIANT_COLUMN_GROUP * sizeof(double) * (all ? 2 : 1) * size;
     // What is kept, at the smallest compression seen in practice (GF 10.2: 8 at eps 0.01).
     const double kept = rows * stored * 40 / 6;
-    const double needed = plan.matrix_bytes + plan.right_hand_bytes + plan.batch_bytes + work + kept;
+    const double needed = plan->matrix_bytes + plan->right_hand_bytes + plan->batch_bytes + work + kept;
     summary->memory_bytes = needed;
     const double here = needed * node_size / size, available = pliant_node_available();
     // On disk: the columns that are solved for, kept until the output is there, and coarser ones.
@@ -123,17 +116,17 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     folder_of(options->output, output_folder, sizeof output_folder);
 
     pliant_progress_note(progress,
-                         "%d vertices in %d level%s, %d free and %d held; dense system of %d unknowns on "
+                         "%d vertices in %d level%s, %d free and %d held; %s on "
                          "%d rank%s (%s)",
                          p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
-                         p->free_count, p->fixed_count, 3 * p->vertex_count, size, size == 1 ? "" : "s", plan.kind);
+                         p->free_count, p->fixed_count, plan->system, size, size == 1 ? "" : "s", plan->solver);
     if (levels.last < p->multires->level_count - 1)
         pliant_progress_note(progress,
                              "columns of levels %d..%d: %d are solved for instead of %.0f",
                              levels.first, levels.last, solved, rows);
     pliant_progress_note(
         progress, "memory %.3g GB (matrix %.3g, right-hand sides %.3g) of %.1f GB available",
-        needed / 1e9, plan.matrix_bytes / 1e9, plan.right_hand_bytes / 1e9, available / 1e9);
+        needed / 1e9, plan->matrix_bytes / 1e9, plan->right_hand_bytes / 1e9, available / 1e9);
     if (partial)
         pliant_progress_note(
             progress,
@@ -168,59 +161,13 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
 
 // ---- The work ----
 
-// A factorization shows no progress: above this many operations, ten seconds of a fast core, it is
-// announced.
-static const double long_factor_flops = 5e11;
-
-// Rows are assembled a few vertices at a time, for the sake of progress.
-static const int32_t assembly_step = 16;
-
-static PetscErrorCode assemble(MPI_Comm comm, const pliant_problem *p, const pliant_options *options,
-                               pliant_dense_system *system, pliant_sample_row *sample,
-                               pliant_progress *progress, pliant_error *err)
-{
-    PetscFunctionBegin;
-    const pliant_dense_rows rows = pliant_dense_system_rows(system);
-    const int32_t columns = pliant_right_hand_count(p, options->blocks);
-    const size_t unknowns = 3 * (size_t)p->vertex_count, ld = 3 * (size_t)assembly_step;
-    double *B;
-    PetscCall(PetscMalloc1(ld * unknowns, &B));
-    pliant_bem *bem = NULL;
-    pliant_status status = pliant_bem_create(p->multires->mesh, &options->material, &bem, err);
-    pliant_progress_begin(progress, "assemble", rows.row_end - rows.row_begin);
-    for (int32_t v = rows.row_begin; v < rows.row_end && status == PLIANT_OK; v += assembly_step) {
-        if ((status = pliant_interruption_check(err)) < 0) break;
-        const int32_t end = rows.row_end - v < assembly_step ? rows.row_end : v + assembly_step;
-        const size_t at = 3 * (size_t)(v - rows.row_begin);
-        status = pliant_bem_assemble(bem, v, end, p->held, rows.A + at, rows.ld_a, B, ld, rows.gravity + at,
-                                     rows.ld_g, err);
-        pliant_right_hand_contract(p, options->blocks, 3 * (end - v), B, ld, rows.right + at, rows.ld_right);
-        pliant_progress_update(progress, end - rows.row_begin);
-    }
-    pliant_bem_destroy(bem);
-    PetscCall(PetscFree(B));
-    PliantCall(comm, status, err);
-
-    // Keep one vertex's rows, against which the solutions will be tested.
-    sample->vertex = rows.row_begin < rows.row_end ? (rows.row_begin + rows.row_end) / 2 : -1;
-    PetscCall(PetscMalloc1(3 * unknowns, &sample->A));
-    PetscCall(PetscMalloc1(9 * (size_t)columns, &sample->right));
-    if (sample->vertex < 0) PetscFunctionReturn(0);
-    const size_t at = 3 * (size_t)(sample->vertex - rows.row_begin);
-    for (size_t u = 0; u < unknowns; u++)
-        memcpy(sample->A + 3 * u, rows.A + u * rows.ld_a + at, 3 * sizeof(double));
-    for (size_t j = 0; j < 3 * (size_t)columns; j++)
-        memcpy(sample->right + 3 * j, rows.right + j * rows.ld_right + at, 3 * sizeof(double));
-    PetscFunctionReturn(0);
-}
-
 // What a run holds; freed in reverse whatever happened.
 typedef struct held {
     pliant_input input;  // of a run without Green's functions
     pliant_problem *problem;
     pliant_lattice_data *lattice;  // on the first rank
-    pliant_dense_system *system;
-    pliant_sample_row sample;
+    const pliant_discretisation *method;
+    void *system;                // the method's
     pliant_greens *greens;
     pliant_dense_output *dense;
     pliant_partial *partial;
@@ -273,48 +220,25 @@ static PetscErrorCode open_partial(MPI_Comm comm, const pliant_options *options,
     const PetscErrorCode code = pliant_partial_create(comm, &def, progress, &h->partial, err);
     free(identity);
     PetscCall(code);
-    // The dense file is written in passing and cannot be taken up again.
-    if (options->dense) PetscCall(pliant_partial_destroy(&h->partial));
+    // The dense file is written in passing and cannot be taken up again; of several bodies gmsh makes
+    // other tetrahedra in every run.
+    const int is_varied = options->method == PLIANT_METHOD_FEM && !options->volume &&
+                          p->component_count > 1;
+    if (options->dense || is_varied) PetscCall(pliant_partial_destroy(&h->partial));
     PetscFunctionReturn(0);
 }
 
 // Collective: the columns' system, assembled and factored.
-static PetscErrorCode make_system(MPI_Comm comm, const pliant_options *options,
-                                  pliant_progress *progress, pliant_run_summary *s, held *h,
-                                  pliant_error *err)
+static PetscErrorCode make_system(MPI_Comm comm, pliant_progress *progress, pliant_run_summary *s,
+                                  held *h, pliant_error *err)
 {
     PetscFunctionBegin;
-    const pliant_problem *p = h->problem;
-    const int32_t solved = pliant_right_hand_count(p, options->blocks);
-    PetscCall(pliant_dense_system_create(comm, p->vertex_count, solved, pliant_greens_batch(comm),
-                                         &h->system));
     work_in_hand(h);
-    PetscCall(assemble(comm, p, options, h->system, &h->sample, progress, err));
+    PetscCall(h->method->assemble(h->system, progress, err));
     PetscCallMPI(MPI_Barrier(comm));
     s->times.assemble = pliant_progress_end(progress);
-
-    const double unknowns = 3.0 * p->vertex_count,
-                 factor_flops = 2 * unknowns * unknowns * unknowns / 3;
-    if (factor_flops > long_factor_flops) {
-        double seconds;
-        char about[64] = "";
-        PetscCall(pliant_dense_system_estimate(h->system, &seconds));
-        if (seconds > 0) snprintf(about, sizeof about, ", about %.0f s", seconds);
-        pliant_progress_note(progress,
-                             "factor: %.2g TFLOP in one piece%s; the solves will take %.1f times that",
-                             factor_flops / 1e12, about,
-                             2 * unknowns * unknowns * 3 * solved / factor_flops);
-    }
-    pliant_progress_begin(progress, "factor", 0);
     PetscCall(nothing_in_hand(comm, h, err));
-    int singular;
-    PetscCall(pliant_dense_system_factor(h->system, &singular));
-    pliant_status status = PLIANT_OK;
-    if (singular)
-        status = pliant_error_set(
-            err, PLIANT_ERR_SINGULAR,
-            "%s: the boundary element system is singular: hold more of the surface", options->mesh);
-    PliantCall(comm, status, err);
+    PetscCall(h->method->factor(h->system, progress, err));
     s->times.factor = pliant_progress_end(progress);
     PetscFunctionReturn(0);
 }
@@ -425,18 +349,25 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     char folder[4096];
     spool_folder(options->output, folder, sizeof folder);
     PetscCall(open_partial(comm, options, progress, h, err));
-    PetscCall(plan_memory(comm, p, options, folder, h->partial, progress, s, err));
-    if (!h->partial || !pliant_partial_is_whole(h->partial))
-        PetscCall(make_system(comm, options, progress, s, h, err));
+    h->method = pliant_discretisation_of(options->method);
+    PetscCall(h->method->create(comm, p, options, pliant_greens_batch(comm), progress, &h->system, err));
+    pliant_solve_plan plan;
+    PetscCall(h->method->plan(h->system, &plan));
+    const int is_whole = h->partial && pliant_partial_is_whole(h->partial);
+    if (is_whole) plan.matrix_bytes = plan.right_hand_bytes = plan.batch_bytes = 0;
+    PetscCall(plan_memory(comm, p, options, &plan, folder, h->partial, progress, s, err));
+    if (!is_whole) PetscCall(make_system(comm, progress, s, h, err));
 
     work_in_hand(h);
     PetscCall(pliant_greens_create(comm, p, options, folder, h->partial, &h->greens, err));
     if (options->dense)
         PetscCall(pliant_dense_output_create(comm, options->dense, p, options->blocks, &h->dense, err));
-    PetscCall(pliant_greens_solve(h->greens, h->system, &h->sample, h->dense, progress, err));
+    PetscCall(pliant_greens_solve(h->greens, h->method, h->system, h->dense, progress, err));
     (void)pliant_progress_end(progress);
     s->times.solve = h->greens->solve_seconds;
     s->times.transform = h->greens->transform_seconds;
+    double worst, residual_bound;
+    PetscCall(h->method->residual(h->system, &worst, &residual_bound));
     s->residual = h->greens->residual;
     if (!(s->residual <= residual_bound))
         status = pliant_error_set(
@@ -446,7 +377,7 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
             options->mesh, s->residual, residual_bound);
     if (status < 0 && h->partial) pliant_partial_finish(h->partial);  // no use to anybody
     PliantCall(comm, status, err);
-    PetscCall(pliant_dense_system_destroy(&h->system));
+    PetscCall(h->method->destroy(&h->system));
 
     PetscCall(nothing_in_hand(comm, h, err));
     PetscCall(pliant_greens_compress(h->greens, progress, err));
@@ -518,9 +449,7 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
     PetscCall(pliant_greens_destroy(&h.greens));
     // After an error of one rank's own the others may be anywhere: no waiting for them.
     if (code == 0 || code == PLIANT_REFUSED) PetscCall(pliant_partial_destroy(&h.partial));
-    PetscCall(PetscFree(h.sample.right));
-    PetscCall(PetscFree(h.sample.A));
-    PetscCall(pliant_dense_system_destroy(&h.system));
+    if (h.method) PetscCall(h.method->destroy(&h.system));
     pliant_lattice_data_destroy(h.lattice);
     PetscCall(pliant_problem_destroy(&h.problem));
     pliant_input_release(&h.input);

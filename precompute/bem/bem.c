@@ -55,26 +55,10 @@ static int frame_from(const pliant_mesh *mesh, double origin[3], double *unit)
     return *unit < INFINITY;
 }
 
-static pliant_status check_material(const pliant_material *material, pliant_error *err)
-{
-    if (!(material->young > 0 && material->young < INFINITY))
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
-                                "Young's modulus: expected more than 0, found %g", material->young);
-    if (!(material->poisson > -1 && material->poisson < 0.5))
-        return pliant_error_set(
-            err, PLIANT_ERR_ARGUMENT,
-            "Poisson's ratio: expected more than -1 and less than 0.5, found %g",
-            material->poisson);
-    if (!(material->density >= 0 && material->density < INFINITY))
-        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "density: expected at least 0, found %g",
-                                material->density);
-    return PLIANT_OK;
-}
-
 pliant_status pliant_bem_create(const pliant_mesh *mesh, const pliant_material *material,
                                 pliant_bem **bem, pliant_error *err)
 {
-    pliant_status status = check_material(material, err);
+    pliant_status status = pliant_material_check(material, err);
     if (status < 0) return status;
     if (mesh->face_count < 4)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT,

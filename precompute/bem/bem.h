@@ -9,17 +9,13 @@
 // Unknown 3j + c belongs to vertex j, component c, in mesh vertex order.
 #pragma once
 
+#include "material.h"
+
 #include "pliant/mesh.h"
 
 #include <stddef.h>
 
 typedef struct pliant_bem pliant_bem;  // geometry, material and quadrature tables; const after create
-
-typedef struct pliant_material {
-    double young;    // Pa
-    double poisson;  // in (-1, 0.5)
-    double density;  // kg/m^3
-} pliant_material;
 
 // `mesh` is borrowed until destroy and must have passed pliant_mesh_check.
 PLIANT_UNUSED_RESULT pliant_status pliant_bem_create(const pliant_mesh *mesh,

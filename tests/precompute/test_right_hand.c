@@ -1,6 +1,7 @@
 // test_right_hand.c: columns solved for directly against the finest ones refined by hats (GF-60..62).
 #include "check.h"
 
+#include "bem/bem.h"
 #include "dense_system.h"
 #include "right_hand.h"
 
@@ -54,7 +55,7 @@ static double *solve(const pliant_problem *p, int32_t *columns)
     assert_false(singular);
     double *x = calloc(3 * (size_t)*columns * rows, sizeof *x);
     for (int32_t first = 0; first < *columns; first += batch) {
-        pliant_dense_share share;
+        pliant_column_share share;
         const int32_t count = *columns - first < batch ? *columns - first : batch;
         assert_int_equal(pliant_dense_system_solve(system, first, count, &share), 0);
         assert_int_equal(share.end - share.begin, count);

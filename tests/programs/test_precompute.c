@@ -160,7 +160,7 @@ static void help_version_and_misuse_have_their_exit_status(void **state)
         {"--scheme lop a.obj", "--scheme: expected loop, butterfly or midpoint, found 'lop'"},
         {"--detail 0 a.obj", "--detail: expected a whole number from 1 to 15, found '0'"},
         {"--detail 3 --subdivide 2 --fixed 'z<0' a.obj -o b.h5", "--detail: expected at most the 2 levels of --subdivide, found 3"},
-        {"--method fem a.obj", "--method: expected bem, found 'fem'"},
+        {"--method fdm a.obj", "--method: expected bem or fem, found 'fdm'"},
         {"--eps 0.1 --rms 0.1 --fixed 'z<0' a.obj -o b.h5", "one kind"},
         {"a.obj -o b.h5", "nothing holds the solid"},
         {"--fixed 'z<' a.obj -o b.h5", "--fixed: column 3"},
