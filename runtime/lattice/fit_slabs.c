@@ -1,17 +1,7 @@
 // fit_slabs.c: the sums of fits over bars and plates, and what comes back to the particles.
 #include "lattice/fits.h"
+#include "lattice/slabs.h"
 #include "pliant/vector_clones.h"
-
-static const float zero_row[PLIANT_FIT_FLOATS];
-
-static float *site_at(const pliant_body *body, int32_t column, int32_t z)
-{
-    const pliant_lattice_column *c = &body->lattice->columns[column];
-    const int32_t w = body->lattice->half_width, s = z - c->z + w;
-    return s < 0 || s >= c->length + 2 * w
-               ? NULL
-               : body->fit_sites + (size_t)(c->first_site + s) * PLIANT_FIT_FLOATS;
-}
 
 // ---- There ----
 
@@ -41,21 +31,6 @@ PLIANT_INLINE void fields_of(const pliant_body *body, const pliant_rigid_field *
     }
 }
 
-// Those of the row's particles that others' regions lack, one after another; k counts them along.
-PLIANT_INLINE void list_row(const pliant_body *body, int32_t y, int32_t end, const float *rows,
-                            int32_t *k)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const size_t length = pliant_row_length(lattice->row_blocks);
-    for (; *k < end; ++*k) {
-        const int32_t *at = lattice->places + 3 * (size_t)lattice->exceptions.particle[*k];
-        if (at[1] != y) return;
-        float *to = body->listed_fits + 16 * (size_t)*k;
-        for (int f = 0; f < PLIANT_FIT_COUNT; f++)
-            to[f] = rows[f * length + PLIANT_ROW_PAD + at[0]];
-    }
-}
-
 PLIANT_INLINE void gather_bars(const pliant_body *body, const pliant_rigid_field *whole, int32_t z,
                                pliant_scratch *scratch)
 {
@@ -72,41 +47,12 @@ PLIANT_INLINE void gather_bars(const pliant_body *body, const pliant_rigid_field
             for (int f = 0; f < PLIANT_FIT_COUNT; f++)
                 pliant_f8_store(scratch->fit_rows + f * length + PLIANT_ROW_PAD + 8 * k, fields[f]);
         }
-        list_row(body, y, lattice->exceptions.slab_first[z + 1], scratch->fit_rows, &listed);
+        pliant_slab_list(lattice, y, z, scratch->fit_rows, PLIANT_FIT_COUNT, body->listed_fits, 16,
+                         &listed);
         float *bars = scratch->fit_bars + (size_t)y * PLIANT_FIT_FLOATS;
         for (int f = 0; f < PLIANT_FIT_COUNT; f++)
             pliant_window_along(scratch->fit_rows + f * length + PLIANT_ROW_PAD, NULL, blocks,
                                 lattice->half_width, scratch->doubled, bars + 8 * f, NULL, apart);
-    }
-}
-
-PLIANT_INLINE void gather_plates(const pliant_body *body, int32_t z, pliant_scratch *scratch)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const int32_t w = lattice->half_width, ny = lattice->dims[1];
-    const int32_t *range = lattice->slab_rows + 2 * z;
-    const int32_t first = range[0] - w, last = range[1] + w;
-    for (int32_t k = 0; k < lattice->row_blocks; k++) {
-        const float *bars = scratch->fit_bars + (size_t)k * ny * PLIANT_FIT_FLOATS;
-        for (int32_t y = first - w; y < last + w; y++)
-            scratch->strip[y - (first - w)] =
-                y < range[0] || y >= range[1] ? zero_row : bars + (size_t)y * PLIANT_FIT_FLOATS;
-        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
-        for (int32_t y = 0; y < ny; y++) {
-            const int32_t column = lattice->column_at[y * lattice->row_blocks + k];
-            float *site = column < 0 ? NULL : site_at(body, column, z);
-            if (site && (y < first || y >= last)) memset(site, 0, PLIANT_FIT_FLOATS * sizeof *site);
-        }
-        for (int32_t y = first; y < last; y++) {
-            const int32_t column =
-                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
-            float *site = column < 0 ? NULL : site_at(body, column, z);
-            if (!site && w <= PLIANT_WINDOW_DIRECT) continue;
-            pliant_f8 sums[PLIANT_FIT_COUNT], none[1];
-            pliant_window_next(&window, y - first, 0, PLIANT_FIT_COUNT, sums, none);
-            if (!site) continue;
-            for (int f = 0; f < PLIANT_FIT_COUNT; f++) pliant_f8_store(site + 8 * f, sums[f]);
-        }
     }
 }
 
@@ -179,7 +125,8 @@ void pliant_fits_gather(pliant_body *body, const pliant_rigid_field *whole, int3
                         pliant_scratch *scratch)
 {
     gather_bars(body, whole, z, scratch);
-    gather_plates(body, z, scratch);
+    pliant_slab_gather(body->lattice, z, scratch->fit_bars, body->fit_sites, 0, PLIANT_FIT_COUNT,
+                       scratch);
     gather_restricted(body, whole, z, scratch);
 }
 
@@ -193,17 +140,11 @@ PLIANT_INLINE float *mean_rows(const pliant_lattice *lattice, pliant_scratch *sc
 PLIANT_INLINE void spread_plates(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
-    const int32_t w = lattice->half_width, ny = lattice->dims[1];
     const int32_t *range = lattice->slab_rows + 2 * z;
     const size_t length = pliant_row_length(lattice->row_blocks);
     for (int32_t k = 0; k < lattice->row_blocks; k++) {
-        for (int32_t y = range[0] - w; y < range[1] + w; y++) {
-            const int32_t column =
-                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
-            const float *site = column < 0 ? NULL : site_at(body, column, z);
-            scratch->strip[y - (range[0] - w)] = site ? site : zero_row;
-        }
-        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+        pliant_window window =
+            pliant_slab_strip(lattice, z, k, body->fit_sites, PLIANT_FIT_COUNT, scratch);
         for (int32_t y = range[0]; y < range[1]; y++) {
             pliant_f8 sums[PLIANT_FIT_TURN_COUNT], none[1];
             pliant_window_next(&window, y - range[0], 0, PLIANT_FIT_TURN_COUNT, sums, none);

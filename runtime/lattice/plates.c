@@ -1,10 +1,8 @@
 // plates.c: sums over bars and plates of particles, and the same way back to the particles.
 #include "lattice/plates.h"
 
-#include "lattice/window.h"
+#include "lattice/slabs.h"
 #include "pliant/vector_clones.h"
-
-static const float zero_row[9 * PLIANT_LANES];
 
 // ---- Forward ----
 
@@ -40,20 +38,6 @@ static int32_t row_is_empty(const pliant_lattice *lattice, int32_t y, int32_t z)
     return 1;
 }
 
-// Those of the row's particles that others' regions lack, one after another; k counts them along.
-PLIANT_INLINE void list_row(const pliant_body *body, int32_t y, int32_t end, const float *rows,
-                            int32_t *k)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const size_t length = pliant_row_length(lattice->row_blocks);
-    for (; *k < end; ++*k) {
-        const int32_t *at = lattice->places + 3 * (size_t)lattice->exceptions.particle[*k];
-        if (at[1] != y) return;
-        float *to = body->weighed + 4 * (size_t)*k;
-        for (int c = 0; c < 3; c++) to[c] = rows[c * length + PLIANT_ROW_PAD + at[0]];
-    }
-}
-
 // Bars (LSM-4, 5): sums and moments along x, shape [row_blocks][dims y][6][8].
 PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
@@ -70,44 +54,11 @@ PLIANT_INLINE void sum_bars(const pliant_body *body, int32_t z, pliant_scratch *
             continue;
         }
         load_row(body, y, z, scratch->rows);
-        list_row(body, y, lattice->exceptions.slab_first[z + 1], scratch->rows, &listed);
+        pliant_slab_list(lattice, y, z, scratch->rows, 3, body->weighed, 4, &listed);
         for (int c = 0; c < 3; c++)
             pliant_window_along(scratch->rows + c * length + PLIANT_ROW_PAD, NULL,
                                 lattice->row_blocks, lattice->half_width, scratch->doubled,
                                 bars + 8 * c, bars + 8 * (3 + c), apart);
-    }
-}
-
-// Plates (LSM-4, 6): sums and moments along y, into the slab's sites.
-PLIANT_INLINE void sum_plates(pliant_body *body, int32_t z, pliant_scratch *scratch)
-{
-    const pliant_lattice *lattice = body->lattice;
-    const int32_t w = lattice->half_width, ny = lattice->dims[1];
-    const int32_t *range = lattice->slab_rows + 2 * z;
-    const int32_t first = range[0] - w, last = range[1] + w;  // plates that hold anything
-    for (int32_t k = 0; k < lattice->row_blocks; k++) {
-        const float *bars = scratch->bars + (size_t)k * ny * 6 * PLIANT_LANES;
-        for (int32_t y = first - w; y < last + w; y++)
-            scratch->strip[y - (first - w)] =
-                y < range[0] || y >= range[1] ? zero_row : bars + (size_t)y * 6 * PLIANT_LANES;
-        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
-        for (int32_t y = 0; y < ny; y++) {
-            const int32_t column = lattice->column_at[y * lattice->row_blocks + k];
-            float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
-            if (site && (y < first || y >= last))
-                memset(site, 0, PLIANT_SITE_FLOATS * sizeof *site);
-        }
-        for (int32_t y = first; y < last; y++) {
-            const int32_t column =
-                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
-            float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
-            if (!site && w <= PLIANT_WINDOW_DIRECT) continue;
-            pliant_f8 sums[6], moments[3];
-            pliant_window_next(&window, y - first, 3, 3, sums, moments);
-            if (!site) continue;
-            for (int f = 0; f < 6; f++) pliant_f8_store(site + 8 * f, sums[f]);
-            for (int f = 0; f < 3; f++) pliant_f8_store(site + 8 * (6 + f), moments[f]);
-        }
     }
 }
 
@@ -163,7 +114,7 @@ PLIANT_VECTOR_CLONES
 void pliant_plates_gather(pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     sum_bars(body, z, scratch);
-    sum_plates(body, z, scratch);
+    pliant_slab_gather(body->lattice, z, scratch->bars, body->sites, 3, 3, scratch);
     sum_restricted(body, z, scratch);
 }
 
@@ -182,17 +133,10 @@ PLIANT_INLINE float *bar_rows(const pliant_lattice *lattice, pliant_scratch *scr
 PLIANT_INLINE void spread_plates(const pliant_body *body, int32_t z, pliant_scratch *scratch)
 {
     const pliant_lattice *lattice = body->lattice;
-    const int32_t w = lattice->half_width, ny = lattice->dims[1];
     const int32_t *range = lattice->slab_rows + 2 * z;
     const size_t length = pliant_row_length(lattice->row_blocks);
     for (int32_t k = 0; k < lattice->row_blocks; k++) {
-        for (int32_t y = range[0] - w; y < range[1] + w; y++) {
-            const int32_t column =
-                y < 0 || y >= ny ? -1 : lattice->column_at[y * lattice->row_blocks + k];
-            const float *site = column < 0 ? NULL : pliant_site_at(body, column, z);
-            scratch->strip[y - (range[0] - w)] = site ? site : zero_row;
-        }
-        pliant_window window = {.w = w, .rows = scratch->strip, .tails = scratch->tails};
+        pliant_window window = pliant_slab_strip(lattice, z, k, body->sites, 9, scratch);
         for (int32_t y = range[0]; y < range[1]; y++) {
             // b comes first, it has the moments; a plate's y is less than the bar's by what the
             // moment counts.

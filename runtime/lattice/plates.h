@@ -19,13 +19,3 @@
 void pliant_plates_gather(pliant_body *body, int32_t z, pliant_scratch *scratch);
 // v += (g - x) / h + h a for the particles of the slab (LSM-12, 1).
 void pliant_plates_scatter(pliant_body *body, int32_t z, float h, pliant_scratch *scratch);
-
-// The site of column c in slab z, or NULL.
-static inline float *pliant_site_at(const pliant_body *body, int32_t column, int32_t z)
-{
-    const pliant_lattice_column *c = &body->lattice->columns[column];
-    const int32_t w = body->lattice->half_width, s = z - c->z + w;
-    return s < 0 || s >= c->length + 2 * w
-               ? NULL
-               : body->sites + (size_t)(c->first_site + s) * PLIANT_SITE_FLOATS;
-}
