@@ -586,9 +586,9 @@ PLIANT_API void pliant_body_velocities(const pliant_body *body, pliant_vec3 *v);
 PLIANT_CALL pliant_status pliant_body_set_positions(pliant_body *body, const pliant_vec3 *x);
 PLIANT_CALL pliant_status pliant_body_set_velocities(pliant_body *body, const pliant_vec3 *v);
 PLIANT_API pliant_vec3 pliant_body_position(const pliant_body *body, int32_t particle);
-// Make `to` what `from` is, bit for bit, for later or for another: positions, velocities, rotations,
-// forces, gravity, broken links; not damping and strain limit. Both are instances of one lattice,
-// and `to` is breakable if `from` is.
+// Make `to` what `from` is, bit for bit, for later or for another: positions, velocities,
+// rotations, forces, gravity, broken links; not damping and strain limit. Both are instances of one
+// lattice, and `to` is breakable if `from` is.
 PLIANT_CALL pliant_status pliant_body_copy(pliant_body *to, const pliant_body *from);
 
 PLIANT_CALL pliant_status pliant_body_set_gravity(pliant_body *body, pliant_vec3 gravity);  // m/s^2
