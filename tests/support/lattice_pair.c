@@ -381,3 +381,12 @@ int lattice_pair_is_finite(const lattice_pair *p)
                 return 0;
     return 1;
 }
+
+int32_t lattice_pair_size(check_cells shape, int32_t w)
+{
+    if (shape == CHECK_CELLS_COMB || shape == CHECK_CELLS_FOLDED) return w < 5 ? 6 : 8;
+    if (shape == CHECK_CELLS_SHELL) return w < 3 ? 7 : 10;
+    if (shape == CHECK_CELLS_TORUS) return 10;
+    if (shape == CHECK_CELLS_TWO) return 4;
+    return 6;
+}

@@ -67,3 +67,7 @@ int32_t lattice_pair_follow_breaks(lattice_pair *pair);
 // The greatest relative change of a link's length, of the body.
 double lattice_pair_strain(const lattice_pair *pair);
 int lattice_pair_is_finite(const lattice_pair *pair);
+
+// Sizes that give every shape particles inside, at its rim and, at the greater widths, regions that
+// lack much of their window.
+int32_t lattice_pair_size(check_cells shape, int32_t w);
