@@ -171,7 +171,8 @@ pliant_status pliant_mesh_builder_finish(const pliant_mesh_builder *b, pliant_me
                                          pliant_error *err)
 {
     if (b->vertex_count == 0)
-        return pliant_error_set(err, PLIANT_ERR_FORMAT, "%s: there are no vertices", b->name);
+        return pliant_error_set(err, PLIANT_ERR_FORMAT,
+                                "%s: there are no vertices: is it a mesh of that format?", b->name);
     if (b->face_count == 0)
         return pliant_error_set(err, PLIANT_ERR_FORMAT, "%s: there are %d vertices, but no faces",
                                 b->name, b->vertex_count);

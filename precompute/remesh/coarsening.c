@@ -1,4 +1,4 @@
-// coarsening.c: a mesh simplified step by step, with a map from every coarse mesh onto the fine
+// coarsening.c: a mesh coarsened step by step, with a map from every coarse mesh onto the fine
 // one.
 #include "remesh/coarsening.h"
 

@@ -1,4 +1,4 @@
-// coarsening.h: a mesh simplified step by step, with a map from every coarse mesh onto the fine
+// coarsening.h: a mesh coarsened step by step, with a map from every coarse mesh onto the fine
 // one.
 //
 // A step removes a vertex: it slides along an edge into a neighbour (a half-edge collapse). The

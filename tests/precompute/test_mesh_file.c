@@ -384,7 +384,7 @@ static void obj_refusals_name_line_and_reason(void **state)
         {"v 0 0 a_very_long_word_that_must_not_fill_the_message\n",
          "a.obj:1: expected the z coordinate in column 7, found "
          "'a_very_long_word_that_must_not_fil...'"},
-        {"# nothing\n", "a.obj: there are no vertices"},
+        {"# nothing\n", "a.obj: there are no vertices: is it a mesh of that format?"},
         {TETRAHEDRON, "a.obj: there are 4 vertices, but no faces"},
     };
     refuse_each("a.obj", list);
@@ -563,7 +563,7 @@ static void off_refusals_name_line_and_reason(void **state)
         {"OFF\n1 1 0\n0 0 0\n9000000000 0 0\n",
          "a.off:4: expected a vertex number, found the end of the line"},
         {"OFF\n1 1 0\n0 0 0\n2 0 0\n", "a.off:4: face has 2 corners, expected at least 3"},
-        {"OFF\n0 0 0\n", "a.off: there are no vertices"},
+        {"OFF\n0 0 0\n", "a.off: there are no vertices: is it a mesh of that format?"},
     };
     refuse_each("a.off", list);
 }
@@ -585,7 +585,7 @@ static void stl_refusals_name_line_or_triangle_and_reason(void **state)
         {"solid a\nface\n", "a.stl:2: expected facet or endsolid in column 1, found 'face'"},
         {"solid a\n", "a.stl:2: expected facet or endsolid, found the end of the file"},
         {"solid a\nendsolid\nfacet\n", "a.stl:3: expected solid in column 1, found 'facet'"},
-        {"solid a\nendsolid\n", "a.stl: there are no vertices"},
+        {"solid a\nendsolid\n", "a.stl: there are no vertices: is it a mesh of that format?"},
         {"sol", "a.stl: expected the 84 bytes of an STL header, or solid; found 3 bytes"},
     };
     refuse_each("a.stl", list);
