@@ -4,6 +4,7 @@
 #include "picture.h"
 #include "png_file.h"
 #include "raster.h"
+#include "recorder.h"
 #include "recording.h"
 #include "scene_drawing.h"
 #include "skin.h"
@@ -39,7 +40,7 @@ pliant_status pliant_drawing_choose_steps(const pliant_draw_options *options, in
     int32_t count = 0;
     if (options->sheet_columns && options->step_count == 0) {
         int64_t last = 0;
-        const pliant_status status = pliant_recording_count_steps(options->script, &last, err);
+        const pliant_status status = pliant_recorder_count_steps(options->script, &last, err);
         if (status < 0) return status;
         if (last < 1)
             return pliant_error_set(err, PLIANT_ERR_ARGUMENT,

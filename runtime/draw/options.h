@@ -2,7 +2,7 @@
 #pragma once
 
 #include "picture.h"
-#include "recording.h"
+#include "recorder.h"
 
 typedef enum pliant_draw_show {
     PLIANT_SHOW_BOTH,  // the rest shape beside the deformed one

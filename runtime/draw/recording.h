@@ -4,9 +4,6 @@
 #include "picture.h"
 #include "pliant/pliant.h"
 
-#define PLIANT_RECORDING_LIMIT 64         // states of one picture
-#define PLIANT_RECORDING_END   INT64_MAX  // the script's last step, whatever its number
-
 typedef struct pliant_recording {
     int32_t count, vertex_count;
     struct pliant_recorded_state {
@@ -28,7 +25,3 @@ PLIANT_UNUSED_RESULT pliant_status pliant_recording_create(const pliant_model *m
                                                            pliant_recording **recording,
                                                            pliant_error *err);
 void pliant_recording_destroy(pliant_recording *recording);  // NULL is fine
-
-// How many steps a script makes, without playing it.
-PLIANT_UNUSED_RESULT pliant_status pliant_recording_count_steps(const char *script_path,
-                                                                int64_t *count, pliant_error *err);

@@ -3,7 +3,7 @@
 
 #include "picture.h"
 #include "png_file.h"
-#include "recording.h"
+#include "recorder.h"
 #include "scene_recording.h"
 
 #include "pliant/error.h"

@@ -5,6 +5,7 @@
 #include "draw/options.h"
 #include "draw/picture.h"
 #include "draw/png_file.h"
+#include "draw/recorder.h"
 #include "draw/recording.h"
 #include "surfaces.h"
 #include "synthetic_model.h"
@@ -511,7 +512,7 @@ static void recorded_states_are_those_of_their_steps(void **state)
                      PLIANT_ERR_ARGUMENT);
     assert_null(recording);
     int64_t count = 0;
-    check_ok(pliant_recording_count_steps(s.script, &count, &err), &err);
+    check_ok(pliant_recorder_count_steps(s.script, &count, &err), &err);
     assert_int_equal(count, 4);
     pliant_model_close(model);
     drop_stage(&s);
