@@ -4,7 +4,7 @@
 #include "check.h"
 
 #include "pliant/error.h"
-#include "player.h"
+#include "script_lines.h"
 #include "synthetic_lattice.h"
 #include "synthetic_model.h"
 
@@ -66,44 +66,6 @@ static pliant_player *create(void)
     return create_with(1);
 }
 
-// Play text, line by line, up to the first refusal.
-static pliant_status play(pliant_player *player, pliant_error *err, const char *text)
-{
-    pliant_statement statement;
-    for (int64_t line = 1; *text; line++) {
-        const size_t length = strcspn(text, "\n");
-        pliant_status status =
-            pliant_statement_parse(text, length, "t.script", line, 0, &statement, err);
-        if (status >= 0) status = pliant_player_execute(player, &statement, NULL, err);
-        if (status < 0) return status;
-        text += length + (text[length] == '\n');
-    }
-    return PLIANT_OK;
-}
-
-__attribute__((format(printf, 2, 3))) static void play_ok(pliant_player *player, const char *format,
-                                                          ...)
-{
-    char text[4096];
-    pliant_error err;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    check_ok(play(player, &err, text), &err);
-}
-
-// The line is refused with a message that contains `part`, and says where.
-static void check_refused(pliant_player *player, const char *line, const char *part)
-{
-    pliant_error err = {""};
-    const pliant_status status = play(player, &err, line);
-    if (status >= 0) fail_msg("\"%s\" was not refused", line);
-    if (strncmp(err.text, "t.script:1:", 11) != 0 || !strstr(err.text, part) ||
-        strchr(err.text, '\n'))
-        fail_msg("\"%s\": \"%s\", expected \"%s\"", line, err.text, part);
-}
-
 static pliant_instances *instances_of(const pliant_player *player)
 {
     return pliant_scene_instances(pliant_player_scene(player));
@@ -132,18 +94,19 @@ static void a_grabbed_particle_goes_where_it_is_moved(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "dt 0.01\ngrab near 1.1 1.2 1.05 hand\nmove hand 1.5 1 1.25 over 5\nstep 2");
+    check_play_ok(player,
+                  "dt 0.01\ngrab near 1.1 1.2 1.05 hand\nmove hand 1.5 1 1.25 over 5\nstep 2");
     check_vec3(particle(player, 0, last_corner()), 1.2, 1, 1.1, 1e-6);
-    play_ok(player, "step 3");
+    check_play_ok(player, "step 3");
     check_vec3(particle(player, 0, last_corner()), 1.5, 1, 1.25, 1e-6);
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 1);
     check_near(pliant_player_last(player)->time, 0.05, 1e-12);
     // It stays there, and the rest follows in its shape, which may turn about it.
-    play_ok(player, "damping 0.5\nrigid-damping 0.5\nstep 300");
+    check_play_ok(player, "damping 0.5\nrigid-damping 0.5\nstep 300");
     check_vec3(particle(player, 0, last_corner()), 1.5, 1, 1.25, 1e-6);
     const pliant_vec3 x = particle(player, 0, 0);
     check_near(hypot(hypot((double)x.x - 1.5, (double)x.y - 1), (double)x.z - 1.25), sqrt(3), 0.6);
-    play_ok(player, "let hand\nstep");
+    check_play_ok(player, "let hand\nstep");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 0);
     pliant_player_destroy(player);
 }
@@ -153,16 +116,16 @@ static void a_radius_grabs_what_is_within(void **state)
     (void)state;
     pliant_player *player = create();
     // The top layer: 25 particles within 0.1 of the plane z = 1 need a wide ball from above.
-    play_ok(player, "grab near 0.5 0.5 6 radius 5.1 lid\nstep");
+    check_play_ok(player, "grab near 0.5 0.5 6 radius 5.1 lid\nstep");
     int32_t held = pliant_player_last(player)->report.constraint_count;
     assert_int_equal(held, 25);
     // Those of a second grab with the name come to it; they keep their places about its point.
-    play_ok(player, "grab 0 lid\nmove lid 0.5 0.5 6.5\nstep");
+    check_play_ok(player, "grab 0 lid\nmove lid 0.5 0.5 6.5\nstep");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 26);
     check_vec3(particle(player, 0, 0), 0, 0, 0.5, 1e-6);
     check_vec3(particle(player, 0, last_corner()), 1, 1, 1.5, 1e-6);
     // Where nobody is within, the nearest is meant.
-    play_ok(player, "grab near 9 9 9 radius 0.5 far\nstep");
+    check_play_ok(player, "grab near 9 9 9 radius 0.5 far\nstep");
     pliant_player_destroy(player);
 }
 
@@ -170,14 +133,14 @@ static void a_bone_turns_what_is_bound_to_it(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "bone arm 1 1 0\nbind arm %d\nturn arm 0 0 3 90 over 10\nstep 10", 0);
+    check_play_ok(player, "bone arm 1 1 0\nbind arm %d\nturn arm 0 0 3 90 over 10\nstep 10", 0);
     // (0,0,0) - (1,1,0) = (-1,-1,0), turned by a right angle: (1,-1,0).
     check_vec3(particle(player, 0, 0), 2, 0, 0, 1e-5);
-    play_ok(player, "move arm 1 1 1\nturn arm 0 0 1 -90\nstep");
+    check_play_ok(player, "move arm 1 1 1\nturn arm 0 0 1 -90\nstep");
     check_vec3(particle(player, 0, 0), 0, 0, 1, 1e-5);
-    check_refused(player, "bind leg 1", "no bone leg here");
-    check_refused(player, "bone arm 0 0 0", "arm is there already");
-    play_ok(player, "let arm\nstep");
+    check_play_refused(player, "bind leg 1", "no bone leg here");
+    check_play_refused(player, "bone arm 0 0 0", "arm is there already");
+    check_play_ok(player, "let arm\nstep");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 0);
     pliant_player_destroy(player);
 }
@@ -189,7 +152,8 @@ static void instances_stand_where_they_are_placed(void **state)
     (void)state;
     pliant_player *player = create();
     pliant_error err;
-    play_ok(player, "instances 5 at 1 2 3 step 2 3 4 columns 2 rows 2\ninstances 1 at 0 0 50");
+    check_play_ok(player,
+                  "instances 5 at 1 2 3 step 2 3 4 columns 2 rows 2\ninstances 1 at 0 0 50");
     check_ok(pliant_player_prepare(player, &err), &err);
     const int32_t n = pliant_instances_vertex_count(instances_of(player));
     assert_int_equal(pliant_player_surface_count(player), 6 * n);
@@ -200,17 +164,18 @@ static void instances_stand_where_they_are_placed(void **state)
             check_vec3(pliant_player_surface(player)[i * n + v], places[i][0], places[i][1],
                        places[i][2], 1e-5);
     // Statements about vertices and particles may name one; "near" looks where they are now.
-    play_ok(player,
-            "collide none\nprobe p instance 4 vertex 0\ngrab near 4 3 4 a\ngrab instance 5 0 b\n"
-            "move b 0 0 51\nstep");
+    check_play_ok(
+        player,
+        "collide none\nprobe p instance 4 vertex 0\ngrab near 4 3 4 a\ngrab instance 5 0 b\n"
+        "move b 0 0 51\nstep");
     int32_t count;
     const pliant_probe *probe = pliant_player_probes(player, &count);
     check_vec3(probe->u, 1, 2, 7, 1e-5);
     check_vec3(particle(player, 5, 0), 0, 0, 51, 1e-5);
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 2);
-    check_refused(player, "probe q instance 6 vertex 0", "instance 6 of 6");
-    check_refused(player, "grab instance 6 0 c", "instance 6 of 6");
-    check_refused(player, "instances 2", "expected before");
+    check_play_refused(player, "probe q instance 6 vertex 0", "instance 6 of 6");
+    check_play_refused(player, "grab instance 6 0 c", "instance 6 of 6");
+    check_play_refused(player, "instances 2", "expected before");
     pliant_player_destroy(player);
 }
 
@@ -221,7 +186,8 @@ static void random_turns_follow_from_their_seed_and_keep_the_middle(void **state
     for (int pass = 0; pass < 3; pass++) {
         pliant_player *player = create();
         pliant_error err;
-        play_ok(player, "instances 3 step 5 0 0 random %d velocity 0 0 -1", pass == 2 ? 8 : 7);
+        check_play_ok(player, "instances 3 step 5 0 0 random %d velocity 0 0 -1",
+                      pass == 2 ? 8 : 7);
         check_ok(pliant_player_prepare(player, &err), &err);
         for (int32_t i = 0; i < 3; i++) {
             pliant_vec3 mean = {0, 0, 0};
@@ -239,7 +205,7 @@ static void random_turns_follow_from_their_seed_and_keep_the_middle(void **state
             if (pass == 0) first[i] = corner;
             else assert_int_equal(memcmp(&corner, &first[i], sizeof corner) == 0, pass == 1);
         }
-        play_ok(player, "dt 0.5\nstep");
+        check_play_ok(player, "dt 0.5\nstep");
         pliant_player_destroy(player);
     }
 }
@@ -250,7 +216,7 @@ static void what_falls_obeys_the_integrator(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "gravity 0 0 -10\ndt 0.01\nprobe p near 0 0 0\nstep 100");
+    check_play_ok(player, "gravity 0 0 -10\ndt 0.01\nprobe p near 0 0 0\nstep 100");
     int32_t count;
     // v_n = n h g, x_n = h sum of v_k (LSM-1, 2): h^2 g n (n + 1) / 2.
     check_vec3(pliant_player_probes(player, &count)->u, 0, 0, -10 * 1e-4 * 100 * 101 / 2, 1e-4);
@@ -263,20 +229,20 @@ static void at_rest_the_contact_force_is_the_weight(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "gravity 0 0 -10\ndt 0.01\ndamping 0.5\nrigid-damping 0.5\n"
-                    "plane 0 0 2 -0.2 friction 0.5 as floor\nstep 600");
+    check_play_ok(player, "gravity 0 0 -10\ndt 0.01\ndamping 0.5\nrigid-damping 0.5\n"
+                          "plane 0 0 2 -0.2 friction 0.5 as floor\nstep 600");
     double force = 0;
     for (int i = 0; i < 50; i++) {
-        play_ok(player, "step");
+        check_play_ok(player, "step");
         force += (double)pliant_player_last(player)->force.z / 50;
     }
     check_near(force, mass * 10, 0.01 * mass * 10);
     for (int32_t p = 0; p <= last_corner(); p++)
         check_at_least((double)particle(player, 0, p).z, -0.1 - 1e-3);
     // The floor is moved up, and pushes; then it is dropped.
-    play_ok(player, "move floor 0 0 0.1 over 50\nstep 100");
+    check_play_ok(player, "move floor 0 0 0.1 over 50\nstep 100");
     check_at_least((double)particle(player, 0, 0).z, 0.1 - 1e-3);
-    play_ok(player, "drop floor\nstep 100");
+    check_play_ok(player, "drop floor\nstep 100");
     check_at_most((double)particle(player, 0, 0).z, -2);
     pliant_player_destroy(player);
 }
@@ -286,8 +252,8 @@ static void an_impulse_is_momentum(void **state)
     (void)state;
     pliant_player *player = create();
     // Shared in proportion to mass: all particles get the same velocity, p / m.
-    play_ok(player,
-            "dt 0.125\nimpulse near 0.5 0.5 0.5 radius 5 4 0 -2\nprobe p near 0 0 0\nstep 8");
+    check_play_ok(player,
+                  "dt 0.125\nimpulse near 0.5 0.5 0.5 radius 5 4 0 -2\nprobe p near 0 0 0\nstep 8");
     int32_t count;
     check_vec3(pliant_player_probes(player, &count)->u, 2, 0, -1, 1e-4);
     check_vec3(pliant_player_last(player)->force, 0, 0, 0, 1e-3);
@@ -298,16 +264,17 @@ static void release_all_lets_go_of_what_has_a_name(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "gravity 0 0 -10\ngrab 0\ngrab 1 hand\nsphere 9 9 9 1 as ball\nsphere 8 8 8 1\n"
-                    "bone arm 0 0 0\nbind arm 2\nstep");
+    check_play_ok(player,
+                  "gravity 0 0 -10\ngrab 0\ngrab 1 hand\nsphere 9 9 9 1 as ball\nsphere 8 8 8 1\n"
+                  "bone arm 0 0 0\nbind arm 2\nstep");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 3);
     assert_int_equal(pliant_scene_obstacles(pliant_player_scene(player), NULL, 0), 2);
-    play_ok(player, "release all\nstep 10");
+    check_play_ok(player, "release all\nstep 10");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 0);
     assert_int_equal(pliant_scene_obstacles(pliant_player_scene(player), NULL, 0), 1);
     check_near((double)pliant_player_last(player)->force.z, 0, 1e-3 * mass * 10);
-    check_refused(player, "move hand 0 0 0", "no hand here");
-    play_ok(player, "capsule 0 0 9 0 0 10 1 taper 0 as hand");  // the name is free again
+    check_play_refused(player, "move hand 0 0 0", "no hand here");
+    check_play_ok(player, "capsule 0 0 9 0 0 10 1 taper 0 as hand");  // the name is free again
     pliant_player_destroy(player);
 }
 
@@ -316,9 +283,9 @@ static void obstacles_are_where_the_script_says(void **state)
     (void)state;
     pliant_player *player = create();
     pliant_obstacle o[4];
-    play_ok(player, "box 1 2 3 2 4 6 friction 0.25 as crate\nplane 0 3 4 10\n"
-                    "capsule 0 0 9 0 0 10 1 taper 0.5 as cone\nmove crate 9 9 9 over 4\n"
-                    "turn cone 0 1 0 90");
+    check_play_ok(player, "box 1 2 3 2 4 6 friction 0.25 as crate\nplane 0 3 4 10\n"
+                          "capsule 0 0 9 0 0 10 1 taper 0.5 as cone\nmove crate 9 9 9 over 4\n"
+                          "turn cone 0 1 0 90");
     const pliant_scene *scene = pliant_player_scene(player);
     assert_int_equal(pliant_scene_obstacles(scene, o, 4), 3);
     assert_int_equal(o[0].kind, PLIANT_OBSTACLE_BOX);
@@ -328,21 +295,21 @@ static void obstacles_are_where_the_script_says(void **state)
     check_vec3(o[1].b, 0, 0.6, 0.8, 1e-6);
     check_vec3(o[1].a, 0, 1.2, 1.6, 1e-6);
     check_near((double)o[2].radius_b, 0.5, 0);
-    play_ok(player, "step 2");
+    check_play_ok(player, "step 2");
     assert_int_equal(pliant_scene_obstacles(scene, o, 4), 3);
     check_vec3(o[0].a, 5.25, 6, 6.75, 1e-5);
     check_near((double)o[2].rotation[1], sqrt(0.5), 1e-6);
-    play_ok(player, "step 5");
+    check_play_ok(player, "step 5");
     assert_int_equal(pliant_scene_obstacles(scene, o, 4), 3);
     check_vec3(o[0].a, 9, 9, 9, 1e-5);
-    play_ok(player, "sphere 5 5 5 1 as crate");  // put there at once, as something else
+    check_play_ok(player, "sphere 5 5 5 1 as crate");  // put there at once, as something else
     assert_int_equal(pliant_scene_obstacles(scene, o, 4), 3);
     assert_int_equal(o[0].kind, PLIANT_OBSTACLE_SPHERE);
     check_vec3(o[0].a, 5, 5, 5, 0);
-    check_refused(player, "grab 0 crate", "crate is an obstacle or a bone");
-    check_refused(player, "let crate", "crate is an obstacle");
-    play_ok(player, "grab 0 hand");
-    check_refused(player, "sphere 0 0 0 1 as hand", "hand is a grab");
+    check_play_refused(player, "grab 0 crate", "crate is an obstacle or a bone");
+    check_play_refused(player, "let crate", "crate is an obstacle");
+    check_play_ok(player, "grab 0 hand");
+    check_play_refused(player, "sphere 0 0 0 1 as hand", "hand is a grab");
     pliant_player_destroy(player);
 }
 
@@ -350,8 +317,9 @@ static void stretched_links_break(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "strain-limit 0.5\ndt 0.01\ngrab near 0.5 0.5 -5 radius 5.1 floor\n"
-                    "grab near 0.5 0.5 6 radius 5.1 lid\nmove lid 0.5 0.5 16 over 200\nstep 400");
+    check_play_ok(player,
+                  "strain-limit 0.5\ndt 0.01\ngrab near 0.5 0.5 -5 radius 5.1 floor\n"
+                  "grab near 0.5 0.5 6 radius 5.1 lid\nmove lid 0.5 0.5 16 over 200\nstep 400");
     // Between the two nothing holds together any more.
     check_at_least((double)pliant_body_broken_count(pliant_instances_body(instances_of(player), 0)),
                    9);
@@ -361,8 +329,8 @@ static void stretched_links_break(void **state)
     }
     pliant_player_destroy(player);
     player = create();
-    play_ok(player, "step");
-    check_refused(player, "strain-limit 0.5", "made unbreakable");
+    check_play_ok(player, "step");
+    check_play_refused(player, "strain-limit 0.5", "made unbreakable");
     pliant_player_destroy(player);
 }
 
@@ -388,19 +356,19 @@ static void statements_of_the_other_kind_are_refused_by_name(void **state)
     };
     pliant_player *player = create();
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
-        check_refused(player, lines[i][0], lines[i][1]);
-    play_ok(player, "step");
+        check_play_refused(player, lines[i][0], lines[i][1]);
+    check_play_ok(player, "step");
     pliant_player_destroy(player);
 
     pliant_error err;
     pliant_player_def def = pliant_player_default(greens);
     def.script_name = "t.script";
     check_ok(pliant_player_create(greens, &def, &player, &err), &err);
-    check_refused(player, "sphere 0 0 0 1", "sphere is about a lattice");
-    check_refused(player, "grab 1 hand", "--lattice makes one");
-    check_refused(player, "probe p instance 1 vertex 3", "instance 1 of 1");
-    play_ok(player, "displace near 0 0 1 0 0 -0.1\nstep");
-    check_refused(player, "instances 2", "this play is of Green's functions already");
+    check_play_refused(player, "sphere 0 0 0 1", "sphere is about a lattice");
+    check_play_refused(player, "grab 1 hand", "--lattice makes one");
+    check_play_refused(player, "probe p instance 1 vertex 3", "instance 1 of 1");
+    check_play_ok(player, "displace near 0 0 1 0 0 -0.1\nstep");
+    check_play_refused(player, "instances 2", "this play is of Green's functions already");
     assert_null(pliant_player_scene(player));
     pliant_player_destroy(player);
     def.kind_rule = PLIANT_KIND_LATTICE;
@@ -432,8 +400,8 @@ static void threads_change_no_bit(void **state)
 {
     (void)state;
     pliant_player *one = create_with(1), *two = create_with(2);
-    play_ok(one, "%s", crowd);
-    play_ok(two, "%s", crowd);
+    check_play_ok(one, "%s", crowd);
+    check_play_ok(two, "%s", crowd);
     const size_t count = (size_t)pliant_player_surface_count(one);
     assert_memory_equal(pliant_player_surface(one), pliant_player_surface(two),
                         count * sizeof(pliant_vec3));
@@ -448,7 +416,7 @@ static void steps_allocate_nothing(void **state)
     (void)state;
     if (!COUNTING) skip();
     pliant_player *player = create();
-    play_ok(player, "%s", crowd);
+    check_play_ok(player, "%s", crowd);
     pliant_statement step;
     pliant_error err;
     check_ok(pliant_statement_parse("step 50", 7, "t", 1, 0, &step, &err), &err);
@@ -463,7 +431,7 @@ static void steps_are_timed_by_phase(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "%s", crowd);
+    check_play_ok(player, "%s", crowd);
     const pliant_step *last = pliant_player_last(player);
     assert_int_equal(last->kind, PLIANT_PLAY_LATTICE);
     int64_t sum = 0;

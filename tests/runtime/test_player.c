@@ -2,7 +2,7 @@
 #include "check.h"
 
 #include "pliant/error.h"
-#include "player.h"
+#include "script_lines.h"
 #include "synthetic_model.h"
 #include "timings.h"
 
@@ -103,36 +103,6 @@ static pliant_player *create(const pliant_model *model)
     return create_at(model, -1);
 }
 
-// Play text, line by line, up to the first refusal.
-static pliant_status play(pliant_player *player, const pliant_observer *observer, pliant_error *err,
-                          const char *text)
-{
-    static const char version[] = "pliant-script 1";
-    pliant_statement statement;
-    for (int64_t line = 1; *text; line++) {
-        const size_t length = strcspn(text, "\n");
-        pliant_status status = pliant_statement_parse(
-            text, length, "t.script", line,
-            line == 1 && strncmp(text, version, sizeof version - 1) == 0, &statement, err);
-        if (status >= 0) status = pliant_player_execute(player, &statement, observer, err);
-        if (status < 0) return status;
-        text += length + (text[length] == '\n');
-    }
-    return PLIANT_OK;
-}
-
-__attribute__((format(printf, 2, 3))) static void play_ok(pliant_player *player, const char *format,
-                                                          ...)
-{
-    char text[4096];
-    pliant_error err;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    check_ok(play(player, NULL, &err, text), &err);
-}
-
 static pliant_vec3 at(const pliant_player *player, int32_t vertex)
 {
     return pliant_player_surface(player)[vertex];
@@ -162,14 +132,14 @@ static void every_statement_runs(void **state)
     (void)state;
     pliant_player *player = create(whole);
     const int32_t a = free_vertex(whole, 10), b = free_vertex(whole, 50), f = fixed_vertex(whole);
-    play_ok(player,
-            "pliant-script 1\n# a comment\n\n"
-            "probe nose vertex %d\nprobe tip near 0.1 0.2 1.3\n"
-            "displace %d 0 0 -0.02\ntraction %d 0 1 0\nforce near 1 0 0 0 0 1\n"
-            "support %d 0 0 0.01\ngravity 0 0 -9.81\nstep\n"
-            "expect nose 0 0 -0.02 1e-7\n"
-            "dt 0.5\nrelease %d\nstep 3\nrelease all\nstep\nexpect nose 0 0 0 1e-6\n",
-            (int)a, (int)a, (int)b, (int)f, (int)a);
+    check_play_ok(player,
+                  "pliant-script 1\n# a comment\n\n"
+                  "probe nose vertex %d\nprobe tip near 0.1 0.2 1.3\n"
+                  "displace %d 0 0 -0.02\ntraction %d 0 1 0\nforce near 1 0 0 0 0 1\n"
+                  "support %d 0 0 0.01\ngravity 0 0 -9.81\nstep\n"
+                  "expect nose 0 0 -0.02 1e-7\n"
+                  "dt 0.5\nrelease %d\nstep 3\nrelease all\nstep\nexpect nose 0 0 0 1e-6\n",
+                  (int)a, (int)a, (int)b, (int)f, (int)a);
     const pliant_step *last = pliant_player_last(player);
     assert_int_equal(last->number, 5);
     // One step of 0.001 and four of 0.5.
@@ -190,13 +160,14 @@ static void state_persists_and_release_undoes_it(void **state)
     (void)state;
     pliant_player *player = create(whole);
     const int32_t a = free_vertex(whole, 5), b = free_vertex(whole, 60);
-    play_ok(player, "displace %d 0.01 0 0\nstep\n", (int)a);
+    check_play_ok(player, "displace %d 0.01 0 0\nstep\n", (int)a);
     const pliant_vec3 alone = at(player, b);
-    play_ok(player, "traction %d 0 0 3\nstep\nrelease %d\nstep\n", (int)b, (int)b);
+    check_play_ok(player, "traction %d 0 0 3\nstep\nrelease %d\nstep\n", (int)b, (int)b);
     // Coherent sums leave rounding of the traction's response behind, some 1e-7 of it.
     check_near(at(player, b).x, alone.x, 1e-6);
     check_near(at(player, b).z, alone.z, 1e-6);
-    play_ok(player, "displace %d 0.02 0 0\nstep\n", (int)a);  // a new value, the same constraint
+    check_play_ok(player, "displace %d 0.02 0 0\nstep\n",
+                  (int)a);  // a new value, the same constraint
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 1);
     check_near(at(player, b).x, 2 * alone.x, 1e-6);
     pliant_player_destroy(player);
@@ -208,9 +179,9 @@ static void releasing_one_condition_keeps_the_others(void **state)
     pliant_player *player = create(whole);
     const int32_t a = free_vertex(whole, 1), b = free_vertex(whole, 2), c = free_vertex(whole, 3);
     int32_t count;
-    play_ok(player, "displace %d 1 0 0\ndisplace %d 2 0 0\ndisplace %d 3 0 0\nrelease %d\n", (int)a,
-            (int)b, (int)c, (int)a);
-    play_ok(player, "displace %d 4 0 0\n", (int)c);  // known already: no third
+    check_play_ok(player, "displace %d 1 0 0\ndisplace %d 2 0 0\ndisplace %d 3 0 0\nrelease %d\n",
+                  (int)a, (int)b, (int)c, (int)a);
+    check_play_ok(player, "displace %d 4 0 0\n", (int)c);  // known already: no third
     const pliant_condition *conditions = pliant_player_conditions(player, &count);
     assert_int_equal(count, 2);
     for (int i = 0; i < 2; i++) {
@@ -218,7 +189,7 @@ static void releasing_one_condition_keeps_the_others(void **state)
         assert_int_equal(conditions[i].node.vertex, is_b ? b : c);
         check_near(conditions[i].value.x, is_b ? 2 : 4, 0);
     }
-    play_ok(player, "release %d\nrelease %d\n", (int)c, (int)c);
+    check_play_ok(player, "release %d\nrelease %d\n", (int)c, (int)c);
     conditions = pliant_player_conditions(player, &count);
     assert_int_equal(count, 1);
     assert_int_equal(conditions[0].node.vertex, b);
@@ -240,7 +211,8 @@ static void all_names_of_a_vertex_are_the_same_vertex(void **state)
     // Not every vertex need have come from the input.
     for (int i = 0; i < (source < n ? 4 : 3); i++) {
         pliant_player *player = create(whole);
-        play_ok(player, "displace %s 0 0.01 0\nprobe p vertex %s\nstep\n", names[i], names[i]);
+        check_play_ok(player, "displace %s 0 0.01 0\nprobe p vertex %s\nstep\n", names[i],
+                      names[i]);
         int32_t count;
         const pliant_condition *conditions = pliant_player_conditions(player, &count);
         assert_int_equal(count, 1);
@@ -257,8 +229,9 @@ static void force_is_traction_times_vertex_area(void **state)
     (void)state;
     const int32_t v = free_vertex(whole, 20);
     pliant_player *force = create(whole), *traction = create(whole);
-    play_ok(force, "force %d 0 0 -3\nstep\n", (int)v);
-    play_ok(traction, "traction %d 0 0 %.17g\nstep\n", (int)v, -3 / pliant_model_area(whole, v));
+    check_play_ok(force, "force %d 0 0 -3\nstep\n", (int)v);
+    check_play_ok(traction, "traction %d 0 0 %.17g\nstep\n", (int)v,
+                  -3 / pliant_model_area(whole, v));
     for (int32_t i = 0; i < pliant_player_surface_count(force); i++)
         check_near(at(force, i).z, at(traction, i).z, 0);
     pliant_player_destroy(force);
@@ -275,7 +248,7 @@ static void a_load_on_a_level_is_the_sum_of_loads_over_its_hat(void **state)
     assert_in_range(k, 0, 11);
     for (int32_t level = 0; level < 3; level++) {
         pliant_player *hat = create(whole), *sum = create(whole);
-        play_ok(hat, "traction %d:%d 1 2 3\nstep\n", (int)level, (int)k);
+        check_play_ok(hat, "traction %d:%d 1 2 3\nstep\n", (int)level, (int)k);
         double values[162] = {0}, area = 0;
         assert_int_equal(n, 162);
         values[k] = 1;
@@ -292,18 +265,18 @@ static void a_load_on_a_level_is_the_sum_of_loads_over_its_hat(void **state)
         for (int32_t v = 0; v < n; v++) {
             area += values[v] * pliant_model_area(whole, v);
             if (values[v] != 0)
-                play_ok(sum, "traction %d %.17g %.17g %.17g\n", (int)v, values[v], 2 * values[v],
-                        3 * values[v]);
+                check_play_ok(sum, "traction %d %.17g %.17g %.17g\n", (int)v, values[v],
+                              2 * values[v], 3 * values[v]);
         }
-        play_ok(sum, "step\n");
+        check_play_ok(sum, "step\n");
         // A sum of up to 61 columns of floats against one of their sum.
         double largest = 0;
         for (int32_t v = 0; v < n; v++) largest = fmax(largest, fabs((double)at(sum, v).z));
         for (int32_t v = 0; v < n; v++) check_near(at(hat, v).z, at(sum, v).z, 1e-5 * largest);
         // And force is traction times the hat's area.
         pliant_player *force = create(whole);
-        play_ok(force, "force %d:%d %.17g %.17g %.17g\nstep\n", (int)level, (int)k, area, 2 * area,
-                3 * area);
+        check_play_ok(force, "force %d:%d %.17g %.17g %.17g\nstep\n", (int)level, (int)k, area,
+                      2 * area, 3 * area);
         for (int32_t v = 0; v < n; v++) check_near(at(force, v).z, at(hat, v).z, 1e-6 * largest);
         pliant_player_destroy(hat);
         pliant_player_destroy(sum);
@@ -318,10 +291,11 @@ static void levels_are_those_of_the_solver(void **state)
     const int32_t a = free_vertex(whole, 2), b = free_vertex(whole, 6), c = free_vertex(whole, 90);
     const int32_t f = fixed_vertex(whole);
     pliant_player *player = create(whole);
-    play_ok(player,
-            "displace 0:%d 0.1 0 0\ndisplace 1:%d 0 0.1 0\ndisplace %d 0 0 0.1\nsupport 1:%d 0 0 "
-            "-0.1\nstep\n",
-            (int)a, (int)b, (int)c, (int)f);
+    check_play_ok(
+        player,
+        "displace 0:%d 0.1 0 0\ndisplace 1:%d 0 0.1 0\ndisplace %d 0 0 0.1\nsupport 1:%d 0 0 "
+        "-0.1\nstep\n",
+        (int)a, (int)b, (int)c, (int)f);
     pliant_solver *solver;
     check_ok(pliant_solver_create(whole, NULL, &solver, &err), &err);
     check_ok(pliant_solver_displace(solver, (pliant_node){0, a}, (pliant_vec3){0.1f, 0, 0}), NULL);
@@ -336,7 +310,7 @@ static void levels_are_those_of_the_solver(void **state)
     check_near(at(player, b).y, 0.1f, 0);
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 3);
     assert_int_equal(pliant_player_last(player)->report.level, 2);
-    play_ok(player, "release %d\nstep\n", (int)c);
+    check_play_ok(player, "release %d\nstep\n", (int)c);
     assert_int_equal(pliant_player_last(player)->report.level, 1);
     pliant_solver_destroy(solver);
     pliant_player_destroy(player);
@@ -348,17 +322,18 @@ static void the_last_statement_about_a_vertex_holds_on_whatever_level(void **sta
     const int32_t v = free_vertex(whole, 1);
     int32_t count;
     pliant_player *player = create(whole), *other = create(whole);
-    play_ok(player,
-            "displace 0:%d 0.1 0 0\nstep\ntraction 2:%d 0 0 5\nstep\ndisplace 1:%d 0 0.2 0\nstep\n",
-            (int)v, (int)v, (int)v);
+    check_play_ok(
+        player,
+        "displace 0:%d 0.1 0 0\nstep\ntraction 2:%d 0 0 5\nstep\ndisplace 1:%d 0 0.2 0\nstep\n",
+        (int)v, (int)v, (int)v);
     const pliant_condition *conditions = pliant_player_conditions(player, &count);
     assert_int_equal(count, 1);
     assert_int_equal(conditions[0].node.level, 1);
     assert_int_equal(conditions[0].kind, PLIANT_CONDITION_DISPLACED);
-    play_ok(other, "displace 1:%d 0 0.2 0\nstep\n", (int)v);
+    check_play_ok(other, "displace 1:%d 0 0.2 0\nstep\n", (int)v);
     // Coherent sums leave rounding of the traction's response behind, some 1e-7 of it.
     for (int32_t i = 0; i < 162; i++) check_near(at(player, i).y, at(other, i).y, 1e-6);
-    play_ok(player, "release 2:%d\nstep\n", (int)v);
+    check_play_ok(player, "release 2:%d\nstep\n", (int)v);
     pliant_player_conditions(player, &count);
     assert_int_equal(count, 0);
     for (int32_t i = 0; i < 162; i++) check_near(at(player, i).y, 0, 1e-6);
@@ -402,17 +377,18 @@ static void near_means_a_vertex_of_the_level(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         int32_t count;
         pliant_player *player = create(cases[i].model);
-        play_ok(player, "displace %snear 0.35 -0.2 0.85 0 0 0.1\nprobe p near 0.35 -0.2 0.85\n",
-                cases[i].prefix);
+        check_play_ok(player,
+                      "displace %snear 0.35 -0.2 0.85 0 0 0.1\nprobe p near 0.35 -0.2 0.85\n",
+                      cases[i].prefix);
         const pliant_condition *conditions = pliant_player_conditions(player, &count);
         assert_int_equal(count, 1);
         assert_int_equal(conditions[0].node.level, cases[i].node.level);
         assert_int_equal(conditions[0].node.vertex, cases[i].node.vertex);
         // A probe looks at any vertex, whatever the file has columns of.
         assert_int_equal(pliant_player_probes(player, &count)[0].vertex, nearest[2]);
-        play_ok(player, "probe q vertex 0:near 0.35 -0.2 0.85\nprobe r vertex 161\n");
+        check_play_ok(player, "probe q vertex 0:near 0.35 -0.2 0.85\nprobe r vertex 161\n");
         assert_int_equal(pliant_player_probes(player, &count)[1].vertex, nearest[0]);
-        play_ok(player, "release %snear 0.35 -0.2 0.85\nstep\n", cases[i].prefix);
+        check_play_ok(player, "release %snear 0.35 -0.2 0.85\nstep\n", cases[i].prefix);
         pliant_player_conditions(player, &count);
         assert_int_equal(count, 0);
         pliant_player_destroy(player);
@@ -438,8 +414,8 @@ static void a_step_that_would_be_late_is_solved_coarser_and_says_so(void **state
     pliant_player *const players[] = {hurried, patient};
     for (int i = 0; i < 2; i++) {
         for (int k = 0; k < 40; k++)
-            play_ok(players[i], "displace %d 0 0 -0.1\n", (int)free_vertex(whole, k));
-        play_ok(players[i], "step\n");
+            check_play_ok(players[i], "displace %d 0 0 -0.1\n", (int)free_vertex(whole, k));
+        check_play_ok(players[i], "step\n");
     }
     const pliant_step *late = pliant_player_last(hurried), *done = pliant_player_last(patient);
     assert_int_equal(late->status, PLIANT_LATE);
@@ -491,18 +467,18 @@ static void compliance_is_the_definitions(void **state)
         // More than the first solver has room for: the larger one is of the same kind.
         for (int k = 0; k < 70; k++) {
             const int32_t v = free_vertex(loose, 3 * k);
-            play_ok(player, "displace %d 0 0 -0.1\n", (int)v);
+            check_play_ok(player, "displace %d 0 0 -0.1\n", (int)v);
             if (k == 0) {
                 check_ok(
                     pliant_solver_displace(solver, (pliant_node){3, v}, (pliant_vec3){0, 0, -0.1f}),
                     NULL);
                 assert_true(pliant_solver_solve(solver, PLIANT_NEVER) >= 0);
-                play_ok(player, "step\n");
+                check_play_ok(player, "step\n");
                 const pliant_vec3 f = pliant_solver_contact_force(solver);
                 assert_memory_equal(&pliant_player_last(player)->force, &f, sizeof f);
             }
         }
-        play_ok(player, "step\n");
+        check_play_ok(player, "step\n");
         forces[i] = pliant_player_last(player)->force;
         pliant_solver_destroy(solver);
         pliant_player_destroy(player);
@@ -549,7 +525,7 @@ static void mistakes_are_told_with_line_and_column(void **state)
     for (size_t i = 0; i < sizeof mistakes / sizeof *mistakes; i++) {
         pliant_error err;
         pliant_player *player = create(mistakes[i].model);
-        assert_true(play(player, NULL, &err, mistakes[i].text) < 0);
+        assert_true(check_play(player, NULL, &err, mistakes[i].text) < 0);
         assert_string_equal(err.text, mistakes[i].message);
         pliant_player_destroy(player);
     }
@@ -581,7 +557,7 @@ static void mistakes_are_told_with_line_and_column(void **state)
         pliant_player *player = create(kinds[i].model);
         snprintf(text, sizeof text, kinds[i].format, (int)kinds[i].vertex);
         snprintf(expected, sizeof expected, kinds[i].message, (int)kinds[i].vertex);
-        assert_true(play(player, NULL, &err, text) < 0);
+        assert_true(check_play(player, NULL, &err, text) < 0);
         assert_string_equal(err.text, expected);
         pliant_player_destroy(player);
     }
@@ -593,7 +569,7 @@ static void numbers_beyond_single_precision_are_refused(void **state)
     pliant_error err;
     pliant_player *player = create(whole);
     // A finite force over a small area.
-    assert_int_equal(play(player, NULL, &err, "force 20 3e38 0 0"), PLIANT_ERR_ARGUMENT);
+    assert_int_equal(check_play(player, NULL, &err, "force 20 3e38 0 0"), PLIANT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "t.script:1:7: "));
     assert_non_null(strstr(err.text, "beyond single precision"));
     pliant_player_destroy(player);
@@ -605,19 +581,19 @@ static void a_refused_statement_changes_nothing(void **state)
     pliant_error err;
     pliant_player *player = create(whole);
     const int32_t a = free_vertex(whole, 7);
-    play_ok(player, "probe p vertex %d\ndisplace %d 0.01 0 0\nstep\n", (int)a, (int)a);
+    check_play_ok(player, "probe p vertex %d\ndisplace %d 0.01 0 0\nstep\n", (int)a, (int)a);
     const pliant_step before = *pliant_player_last(player);
     const char *const refused[] = {"displace 999 1 1 1", "support 999 1 1 1",
                                    "probe p vertex 1",   "expect p 9 9 9 1",
                                    "expect q 0 0 0 1",   "displace 0:12 1 1 1"};
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
-        assert_true(play(player, NULL, &err, refused[i]) < 0);
+        assert_true(check_play(player, NULL, &err, refused[i]) < 0);
     int32_t count;
     pliant_player_conditions(player, &count);
     assert_int_equal(count, 1);
     pliant_player_probes(player, &count);
     assert_int_equal(count, 1);
-    play_ok(player, "step\nexpect p 0.01 0 0 1e-8\n");
+    check_play_ok(player, "step\nexpect p 0.01 0 0 1e-8\n");
     assert_int_equal(pliant_player_last(player)->number, 2);
     check_near(pliant_player_last(player)->force.x, before.force.x, 0);
     pliant_player_destroy(player);
@@ -659,18 +635,18 @@ static void expectations_are_met_within_their_tolerance_only(void **state)
     char text[256];
     snprintf(text, sizeof text, "probe p vertex %d\ndisplace %d 0.25 0 -0.5\nstep 4\n", (int)a,
              (int)a);
-    check_ok(play(player, &observer, &err, text), &err);
+    check_ok(check_play(player, &observer, &err, text), &err);
     assert_int_equal(h.steps, 4);
     // 3-4-5: the distance is 0.5, up to its last bit; 0.25 and 0.5 are exact in a float.
-    check_ok(play(player, &observer, &err, "expect p 0.55 0.4 -0.5 0.5000001"), &err);
+    check_ok(check_play(player, &observer, &err, "expect p 0.55 0.4 -0.5 0.5000001"), &err);
     check_near(h.distance, 0.5, 1e-15);
     assert_int_equal(h.met, 1);
-    assert_int_equal(play(player, &observer, &err, "expect p 0.55 0.4 -0.5 0.4999"),
+    assert_int_equal(check_play(player, &observer, &err, "expect p 0.55 0.4 -0.5 0.4999"),
                      PLIANT_ERR_ARGUMENT);
     assert_int_equal(h.missed, 1);
     assert_string_equal(err.text, "t.script:1:8: expect p: found 0.25 0 -0.5, expected 0.55 0.4 "
                                   "-0.5: distance 0.5, tolerance 0.4999");
-    check_ok(play(player, &observer, &err, "expect p 0.25 0 -0.5 0"), &err);
+    check_ok(check_play(player, &observer, &err, "expect p 0.25 0 -0.5 0"), &err);
     pliant_player_destroy(player);
 }
 
@@ -688,7 +664,7 @@ static void an_observer_can_end_the_play(void **state)
     pliant_error err;
     const pliant_observer observer = {.stepped = stop_at_third};
     pliant_player *player = create(whole);
-    assert_int_equal(play(player, &observer, &err, "step 1000"), PLIANT_ERR_IO);
+    assert_int_equal(check_play(player, &observer, &err, "step 1000"), PLIANT_ERR_IO);
     assert_string_equal(err.text, "enough");
     assert_int_equal(pliant_player_last(player)->number, 3);
     pliant_player_destroy(player);
@@ -704,11 +680,11 @@ static void more_conditions_than_the_solver_began_with_are_played(void **state)
     pliant_player *player = create(loose);
     for (int32_t i = 0; i < constraints + loads; i++) {
         const int32_t v = free_vertex(loose, i);
-        if (i < loads) play_ok(player, "traction %d 0 0 5\n", (int)v);
-        else play_ok(player, "displace %d 0 0 %.17g\n", (int)v, 1e-3 * i);
-        if (i % 100 == 50) play_ok(player, "gravity 0 0.01 0\nstep\n");
+        if (i < loads) check_play_ok(player, "traction %d 0 0 5\n", (int)v);
+        else check_play_ok(player, "displace %d 0 0 %.17g\n", (int)v, 1e-3 * i);
+        if (i % 100 == 50) check_play_ok(player, "gravity 0 0.01 0\nstep\n");
     }
-    play_ok(player, "step\n");
+    check_play_ok(player, "step\n");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, constraints);
 
     // The same from a solver that had the room from the start.
@@ -747,10 +723,10 @@ static void probes_are_exact_whatever_the_level_of_the_surface(void **state)
     const int32_t near = free_vertex(loose, 3), far = free_vertex(loose, 300);
     pliant_player *const players[] = {all, some};
     for (int i = 0; i < 2; i++)
-        play_ok(players[i],
-                "probe near vertex %d\nprobe far vertex %d\nprobe held vertex %d\n"
-                "displace near 0 0 1 0 0 -0.1\ntraction near 1 0 0 0 0 1\nstep\n",
-                (int)near, (int)far, (int)fixed_vertex(loose));
+        check_play_ok(players[i],
+                      "probe near vertex %d\nprobe far vertex %d\nprobe held vertex %d\n"
+                      "displace near 0 0 1 0 0 -0.1\ntraction near 1 0 0 0 0 1\nstep\n",
+                      (int)near, (int)far, (int)fixed_vertex(loose));
     int32_t count;
     const pliant_probe *exact = pliant_player_probes(all, &count);
     const pliant_probe *found = pliant_player_probes(some, &count);
@@ -771,16 +747,16 @@ static void late_probes_follow_the_rule(void **state)
     pliant_error err;
     pliant_player *player = create(whole);
     const int32_t a = free_vertex(whole, 7);
-    play_ok(player, "displace %d 0.25 0 0\nstep\nprobe p vertex %d\nexpect p 0.25 0 0 0\n", (int)a,
-            (int)a);
+    check_play_ok(player, "displace %d 0.25 0 0\nstep\nprobe p vertex %d\nexpect p 0.25 0 0 0\n",
+                  (int)a, (int)a);
     pliant_player_destroy(player);
 
     pliant_player_def def = pliant_player_default(whole);
     def.script_name = "t.script";
     def.probe_rule = PLIANT_PROBES_FIRST;
     check_ok(pliant_player_create(whole, &def, &player, &err), &err);
-    play_ok(player, "probe p vertex 1\nstep\n");
-    assert_int_equal(play(player, NULL, &err, "probe q vertex 1"), PLIANT_ERR_ARGUMENT);
+    check_play_ok(player, "probe p vertex 1\nstep\n");
+    assert_int_equal(check_play(player, NULL, &err, "probe q vertex 1"), PLIANT_ERR_ARGUMENT);
     assert_string_equal(err.text, "t.script:1:7: probe q after a step: with rows written per step "
                                   "(-o, --json), probes must come before the first");
     pliant_player_destroy(player);
@@ -791,8 +767,8 @@ static void too_many_probes_are_refused(void **state)
     (void)state;
     pliant_error err;
     pliant_player *player = create(whole);
-    for (int i = 0; i < PLIANT_PROBE_LIMIT; i++) play_ok(player, "probe p%d vertex 1\n", i);
-    assert_int_equal(play(player, NULL, &err, "probe more vertex 1"), PLIANT_ERR_CAPACITY);
+    for (int i = 0; i < PLIANT_PROBE_LIMIT; i++) check_play_ok(player, "probe p%d vertex 1\n", i);
+    assert_int_equal(check_play(player, NULL, &err, "probe more vertex 1"), PLIANT_ERR_CAPACITY);
     assert_string_equal(err.text, "t.script:1:7: more than 1024 probes");
     pliant_player_destroy(player);
 }
@@ -816,7 +792,7 @@ static void steps_do_not_allocate(void **state)
     skip();
 #else
     pliant_player *player = create_at(loose, 2);
-    play_ok(player, "probe p near 0 0 1\nprobe q near 1 0 0\n");
+    check_play_ok(player, "probe p near 0 0 1\nprobe q near 1 0 0\n");
     enum { LINES = 8 };
     pliant_statement statements[LINES];
     pliant_error err;

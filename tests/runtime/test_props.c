@@ -3,8 +3,8 @@
 #include "allocations.h"
 #include "check.h"
 
-#include "player.h"
 #include "pliant/error.h"
+#include "script_lines.h"
 #include "synthetic_model.h"
 
 #include <math.h>
@@ -54,33 +54,6 @@ static pliant_player *create(void)
     return player;
 }
 
-// Play text, line by line, up to the first refusal.
-static pliant_status play(pliant_player *player, pliant_error *err, const char *text)
-{
-    pliant_statement statement;
-    for (int64_t line = 1; *text; line++) {
-        const size_t length = strcspn(text, "\n");
-        pliant_status status =
-            pliant_statement_parse(text, length, "t.script", line, 0, &statement, err);
-        if (status >= 0) status = pliant_player_execute(player, &statement, NULL, err);
-        if (status < 0) return status;
-        text += length + (text[length] == '\n');
-    }
-    return PLIANT_OK;
-}
-
-__attribute__((format(printf, 2, 3))) static void play_ok(pliant_player *player, const char *format,
-                                                          ...)
-{
-    char text[4096];
-    pliant_error err;
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
-    check_ok(play(player, &err, text), &err);
-}
-
 static const pliant_prop *find(const pliant_player *player, const char *name)
 {
     int32_t count;
@@ -126,7 +99,7 @@ static void state_cap(pliant_player *player, const char *name, double reach, dou
     int32_t vertices[642];
     const int32_t count = cap(reach, vertices);
     for (int32_t i = 0; i < count; i++)
-        play_ok(player, "patch %s %d 0 0 %.9g\n", name, (int)vertices[i], -depth);
+        check_play_ok(player, "patch %s %d 0 0 %.9g\n", name, (int)vertices[i], -depth);
 }
 
 static pliant_solver *passive_solver(void)
@@ -165,9 +138,9 @@ static void a_patch_is_solved_as_the_library_solves_it(void **state)
     check_ok(pliant_solver_surface(solver, 3, expected), NULL);
 
     pliant_player *player = create();
-    play_ok(player, "patch thumb tolerance 4e-3\n");
+    check_play_ok(player, "patch thumb tolerance 4e-3\n");
     state_cap(player, "thumb", 0.8, 0.05);
-    play_ok(player, "step\n");
+    check_play_ok(player, "step\n");
     const pliant_prop *thumb = find(player, "thumb");
     // The same operations in the same order.
     check_whole(player, expected, 1e-7);
@@ -180,7 +153,7 @@ static void a_patch_is_solved_as_the_library_solves_it(void **state)
     check_at_most(thumb->force.z, -1e-2);
 
     // Another tolerance holds from the next step on; 0: every vertex is a node.
-    play_ok(player, "patch thumb tolerance 0\nstep\n");
+    check_play_ok(player, "patch thumb tolerance 0\nstep\n");
     assert_int_equal(find(player, "thumb")->node_count, count);
     assert_int_equal(pliant_player_last(player)->report.constraint_count, count);
     pliant_patch_destroy(patch);
@@ -205,8 +178,9 @@ static void a_tool_is_solved_as_the_library_solves_it(void **state)
     check_ok(pliant_solver_surface(solver, 3, expected), NULL);
 
     pliant_player *player = create();
-    play_ok(player, "contact tolerance 2e-3\ntool ball sphere 0.125 0 1.25 0.3125 friction 0.5\n"
-                    "step\n");
+    check_play_ok(player,
+                  "contact tolerance 2e-3\ntool ball sphere 0.125 0 1.25 0.3125 friction 0.5\n"
+                  "step\n");
     const pliant_prop *prop = find(player, "ball");
     const pliant_tool_result result = pliant_contact_tool(contact, 0);
     check_whole(player, expected, 1e-7);
@@ -220,7 +194,7 @@ static void a_tool_is_solved_as_the_library_solves_it(void **state)
     assert_int_equal(pliant_player_last(player)->report.level,
                      pliant_contact_last(contact).finest_level);
     // Away, it does nothing.
-    play_ok(player, "move ball 0 0 2\nstep\n");
+    check_play_ok(player, "move ball 0 0 2\nstep\n");
     assert_int_equal(find(player, "ball")->node_count, 0);
     check_vec3(pliant_player_last(player)->force, (pliant_vec3){0, 0, 0}, 0);
     pliant_contact_destroy(contact);
@@ -246,9 +220,9 @@ static void a_proxy_is_solved_as_the_library_solves_it(void **state)
     check_ok(pliant_solver_surface(solver, 3, expected), NULL);
 
     pliant_player *player = create();
-    play_ok(player, "proxy pen 0 0 1.25 stiffness 3 friction 0.25\nstep\n");
+    check_play_ok(player, "proxy pen 0 0 1.25 stiffness 3 friction 0.25\nstep\n");
     assert_int_equal(find(player, "pen")->node_count, 0);
-    play_ok(player, "move pen 0.0625 0 0.875\nstep\n");
+    check_play_ok(player, "move pen 0.0625 0 0.875\nstep\n");
     const pliant_prop *pen = find(player, "pen");
     assert_int_equal(pen->node_count, 1);
     check_whole(player, expected, 1e-7);
@@ -273,7 +247,7 @@ static void all_kinds_add_up_to_the_contact_force(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "%sstep 5\n", mixture);
+    check_play_ok(player, "%sstep 5\n", mixture);
     const pliant_vec3 patch = find(player, "side")->force, ball = find(player, "ball")->force;
     const pliant_vec3 floor = find(player, "floor")->force, pen = find(player, "pen")->force;
     check_at_most(patch.x, -1e-3);
@@ -305,14 +279,15 @@ static void what_fades_after_a_patch_counts(void **state)
     int32_t vertices[642];
     const int32_t count = cap(0.4, vertices);
     pliant_player *player = create();
-    play_ok(player, "patch thumb tolerance 1e-3\n");
+    check_play_ok(player, "patch thumb tolerance 1e-3\n");
     state_cap(player, "thumb", 0.4, 0.05);
-    play_ok(player, "step\npatch thumb tolerance 0.05\n");
+    check_play_ok(player, "step\npatch thumb tolerance 0.05\n");
     for (int32_t i = 1; i < count; i++)
-        play_ok(player, "patch thumb %d 0 0 %.9g\n", (int)vertices[i], -0.05 + 0.001 * i / count);
+        check_play_ok(player, "patch thumb %d 0 0 %.9g\n", (int)vertices[i],
+                      -0.05 + 0.001 * i / count);
     int fading = 0;
     for (int step = 0; step < 40; step++) {
-        play_ok(player, "step\n");
+        check_play_ok(player, "step\n");
         const pliant_vec3 force = find(player, "thumb")->force;
         check_vec3(pliant_player_last(player)->force, force, 1e-5);
         const pliant_vec3 counted = pliant_solver_contact_force(pliant_player_solver(player));
@@ -332,14 +307,14 @@ static void dropped_things_leave_nothing_behind(void **state)
         "drop side\ndrop ball\ndrop floor\ndrop pen\nrelease near -1 0 0\n", "release all\n"};
     for (int k = 0; k < 2; k++) {
         pliant_player *player = create();
-        play_ok(player, "%sstep 3\n%sstep\n", mixture, endings[k]);
+        check_play_ok(player, "%sstep 3\n%sstep\n", mixture, endings[k]);
         // Sums that were added up and taken away again: rounding of displacements of 0.05.
         check_whole(player, rest, 1e-7);
         check_vec3(pliant_player_last(player)->force, (pliant_vec3){0, 0, 0}, 0);
         assert_int_equal(pliant_player_last(player)->report.constraint_count, 0);
         assert_true(pliant_props_is_empty(pliant_player_props(player)));
         // All names can come back.
-        play_ok(player, "%sstep\n", mixture);
+        check_play_ok(player, "%sstep\n", mixture);
         check_at_least(find(player, "ball")->node_count, 1);
         check_at_most(find(player, "side")->force.x, -1e-3);
         pliant_player_destroy(player);
@@ -352,23 +327,23 @@ static void vertices_leave_a_patch_one_by_one_or_all(void **state)
     int32_t vertices[642];
     const int32_t count = cap(0.3, vertices);
     pliant_player *player = create();
-    play_ok(player, "patch thumb tolerance 0\n");
+    check_play_ok(player, "patch thumb tolerance 0\n");
     state_cap(player, "thumb", 0.3, 0.05);
-    play_ok(player, "step\n");
+    check_play_ok(player, "step\n");
     assert_int_equal(find(player, "thumb")->node_count, count);
-    play_ok(player, "patch thumb release %d\npatch thumb release %d\nstep\n", (int)vertices[1],
-            (int)vertices[1]);
+    check_play_ok(player, "patch thumb release %d\npatch thumb release %d\nstep\n",
+                  (int)vertices[1], (int)vertices[1]);
     assert_int_equal(find(player, "thumb")->node_count, count - 1);
     // The freed vertex may have a condition now; the others may not.
     pliant_error err;
     char text[64];
-    play_ok(player, "displace %d 0 0 0.01\nstep\n", (int)vertices[1]);
+    check_play_ok(player, "displace %d 0 0 0.01\nstep\n", (int)vertices[1]);
     check_near(pliant_player_surface(player)[vertices[1]].z, 0.01, 1e-6);
     snprintf(text, sizeof text, "force %d 0 0 1", (int)vertices[0]);
-    assert_int_equal(play(player, &err, text), PLIANT_ERR_ARGUMENT);
+    assert_int_equal(check_play(player, NULL, &err, text), PLIANT_ERR_ARGUMENT);
     snprintf(text, sizeof text, "patch thumb %d 0 0 1", (int)vertices[1]);
-    assert_int_equal(play(player, &err, text), PLIANT_ERR_ARGUMENT);
-    play_ok(player, "patch thumb release all\nstep\n");
+    assert_int_equal(check_play(player, NULL, &err, text), PLIANT_ERR_ARGUMENT);
+    check_play_ok(player, "patch thumb release all\nstep\n");
     assert_int_equal(find(player, "thumb")->node_count, 0);
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 1);
     pliant_player_destroy(player);
@@ -390,8 +365,8 @@ static void moving_a_tool_is_declaring_it_elsewhere(void **state)
     };
     for (size_t k = 0; k < sizeof tools / sizeof *tools; k++) {
         pliant_player *moved = create(), *declared = create();
-        play_ok(moved, "%sstep\n%sstep\n", tools[k].first, tools[k].move);
-        play_ok(declared, "%sstep\n%sstep\n", tools[k].first, tools[k].again);
+        check_play_ok(moved, "%sstep\n%sstep\n", tools[k].first, tools[k].move);
+        check_play_ok(declared, "%sstep\n%sstep\n", tools[k].first, tools[k].again);
         check_whole(moved, pliant_player_surface(declared), 1e-6);
         check_vec3(find(moved, "t")->force, find(declared, "t")->force, 1e-5);
         check_at_most(find(moved, "t")->force.z, -1e-2);
@@ -405,7 +380,7 @@ static void everything_moves_over_to_a_larger_solver(void **state)
     (void)state;
     pliant_player *player = create(), *roomy = create();
     // The other one has the room from the start: the same conditions come first.
-    play_ok(player, "%sstep 40\n", mixture);
+    check_play_ok(player, "%sstep 40\n", mixture);
     const pliant_solver *before = pliant_player_solver(player);
     for (int k = 0; k < 2; k++) {
         pliant_player *p = k ? roomy : player;
@@ -416,13 +391,13 @@ static void everything_moves_over_to_a_larger_solver(void **state)
             if (pliant_model_is_free(model, v) != 1 || x[2] > 0.8 || fabs(x[0]) > 0.9 ||
                 x[1] < -0.9)
                 continue;
-            play_ok(p, "traction %d 0 0.0009765625 0\n", (int)v);
+            check_play_ok(p, "traction %d 0 0.0009765625 0\n", (int)v);
             placed++;
         }
         assert_int_equal(placed, 300);
     }
-    play_ok(player, "step 40\n");
-    play_ok(roomy, "%sstep 40\n", mixture);
+    check_play_ok(player, "step 40\n");
+    check_play_ok(roomy, "%sstep 40\n", mixture);
     assert_true(pliant_player_solver(player) != before);
     // Settled, both are in the same state to the tolerances of patch and tools; a contact that
     // was lost would be off by the whole displacement, some 0.05.
@@ -442,12 +417,12 @@ static void patches_find_room_for_all_their_vertices(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "tool ball sphere 0 -1.2 0 0.25\npatch large tolerance 0\n");
+    check_play_ok(player, "tool ball sphere 0 -1.2 0 0.25\npatch large tolerance 0\n");
     int32_t vertices[642];
     const int32_t count = cap(0.9, vertices);
     check_at_least(count, 120);  // beyond 64, the solver's at first
     state_cap(player, "large", 0.9, 0.01);
-    play_ok(player, "step\n");
+    check_play_ok(player, "step\n");
     assert_int_equal(find(player, "large")->node_count, count);
     check_at_most(find(player, "large")->error, 1e-6);
     check_at_least(find(player, "ball")->force.y, 1e-3);
@@ -460,7 +435,7 @@ static void deadlines_hold_for_all_kinds(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "deadline 0\n%sstep 3\n", mixture);
+    check_play_ok(player, "deadline 0\n%sstep 3\n", mixture);
     const pliant_step *last = pliant_player_last(player);
     assert_int_equal(last->report.is_late, 1);
     check_at_least(last->report.lateness_ns, 1000);  // no step of four objects takes a microsecond
@@ -470,7 +445,7 @@ static void deadlines_hold_for_all_kinds(void **state)
         assert_true(isfinite(u.x) && isfinite(u.y) && isfinite(u.z));
     }
     // Time again: everything as if nothing had been.
-    play_ok(player, "deadline none\nstep 20\n");
+    check_play_ok(player, "deadline none\nstep 20\n");
     assert_int_equal(pliant_player_last(player)->report.is_late, 0);
     assert_int_equal(pliant_player_last(player)->report.lateness_ns, 0);
     check_at_most(find(player, "side")->error, 1e-3);
@@ -482,10 +457,11 @@ static void tools_that_run_out_of_time_are_late(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "deadline 0\ncontact tolerance 1e-5\ntool ball sphere 0 0 1.25 0.3\nstep\n");
+    check_play_ok(player,
+                  "deadline 0\ncontact tolerance 1e-5\ntool ball sphere 0 0 1.25 0.3\nstep\n");
     assert_int_equal(pliant_player_last(player)->report.constraint_count, 0);
     assert_int_equal(pliant_player_last(player)->report.is_late, 1);
-    play_ok(player, "deadline none\nstep 3\n");
+    check_play_ok(player, "deadline none\nstep 3\n");
     assert_int_equal(pliant_player_last(player)->report.is_late, 0);
     pliant_player_destroy(player);
 }
@@ -496,18 +472,18 @@ static void levels_are_those_of_tools_too(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "contact tolerance 0.04\ntool ball sphere 0 0 1.4 0.5\nstep\n");
+    check_play_ok(player, "contact tolerance 0.04\ntool ball sphere 0 0 1.4 0.5\nstep\n");
     check_at_least(find(player, "ball")->node_count, 1);
     const int32_t coarse = pliant_player_last(player)->report.level;
     check_at_most(coarse, 2);
-    play_ok(player, "displace 0:near 1 0 0 -0.01 0 0\nstep\n");
+    check_play_ok(player, "displace 0:near 1 0 0 -0.01 0 0\nstep\n");
     check_at_least(pliant_player_last(player)->report.level, coarse);
-    play_ok(player, "displace 3:near 0 1 0 0 0 0\nstep\n");
+    check_play_ok(player, "displace 3:near 0 1 0 0 0 0\nstep\n");
     assert_int_equal(pliant_player_last(player)->report.level, 3);
     pliant_player_destroy(player);
     player = create();
-    play_ok(player, "contact tolerance 1e-4\ntool ball sphere 0 0 1.25 0.3\n"
-                    "displace 0:near 1 0 0 -0.01 0 0\nstep\n");
+    check_play_ok(player, "contact tolerance 1e-4\ntool ball sphere 0 0 1.25 0.3\n"
+                          "displace 0:near 1 0 0 -0.01 0 0\nstep\n");
     check_at_least(pliant_player_last(player)->report.level, 2);
     pliant_player_destroy(player);
 }
@@ -526,16 +502,16 @@ static void the_first_tool_or_proxy_makes_contact_passive(void **state)
 {
     (void)state;
     pliant_player *player = create();
-    play_ok(player, "patch p tolerance 1e-3\n");
+    check_play_ok(player, "patch p tolerance 1e-3\n");
     assert_false(contact_is_passive(player));  // patches do not
-    play_ok(player, "proxy pen 0 0 2\n");
+    check_play_ok(player, "proxy pen 0 0 2\n");
     assert_true(contact_is_passive(player));
     // For good.
-    play_ok(player, "drop pen\nrelease all\npatch p tolerance 1e-3\n");
+    check_play_ok(player, "drop pen\nrelease all\npatch p tolerance 1e-3\n");
     assert_true(contact_is_passive(player));
     pliant_player_destroy(player);
     player = create();
-    play_ok(player, "tool floor plane 0 0 1 -9\ndrop floor\n");
+    check_play_ok(player, "tool floor plane 0 0 1 -9\ndrop floor\n");
     assert_true(contact_is_passive(player));
     pliant_player_destroy(player);
 }
@@ -547,8 +523,8 @@ static void marks_are_where_things_act(void **state)
     pliant_prop_mark marks[16];
     const pliant_props *props = pliant_player_props(player);
     assert_int_equal(pliant_props_marks(props, NULL, 0), 0);
-    play_ok(player, "patch side tolerance 1e-3\npatch side near 1 0 0 -0.02 0 0\n"
-                    "tool ball sphere 0 0 1.25 0.275\nproxy pen 0 -0.9 0\nstep\n");
+    check_play_ok(player, "patch side tolerance 1e-3\npatch side near 1 0 0 -0.02 0 0\n"
+                          "tool ball sphere 0 0 1.25 0.275\nproxy pen 0 -0.9 0\nstep\n");
     const int32_t count = pliant_props_marks(props, marks, 16);
     assert_int_equal(count, 2 + find(player, "ball")->node_count);
     check_at_most(count, 16);
@@ -570,7 +546,7 @@ static void steps_with_all_kinds_do_not_allocate(void **state)
     (void)state;
     if (!COUNTING) skip();
     pliant_player *player = create();
-    play_ok(player, "%sstep\n", mixture);
+    check_play_ok(player, "%sstep\n", mixture);
     static const char *const lines[] = {"move ball 0.05 0 1.22",
                                         "move pen 0.1 -0.9 0",
                                         "patch side near 1 0 0 -0.03 0 0",
@@ -601,7 +577,7 @@ static void steps_with_all_kinds_do_not_allocate(void **state)
 static void check_refused(pliant_player *player, const char *text, const char *message)
 {
     pliant_error err = {""};
-    assert_true(play(player, &err, text) < 0);
+    assert_true(check_play(player, NULL, &err, text) < 0);
     assert_string_equal(err.text, message);
 }
 
@@ -613,8 +589,8 @@ static void mistakes_are_told_with_line_and_column_and_change_nothing(void **sta
     char text[128], message[256];
     int32_t fixed = 0, side = pliant_model_nearest(model, (const double[3]){1, 0, 0});
     while (pliant_model_is_free(model, fixed) == 1) fixed++;
-    play_ok(player, "%sstep\n", mixture);
-    play_ok(twin, "%sstep\n", mixture);
+    check_play_ok(player, "%sstep\n", mixture);
+    check_play_ok(twin, "%sstep\n", mixture);
     check_refused(player, "\npatch other near 1 0 0 0 0 0",
                   "t.script:2:7: no patch other: expected \"patch other tolerance T\" before");
     check_refused(player, "patch ball tolerance 1",
@@ -651,16 +627,17 @@ static void mistakes_are_told_with_line_and_column_and_change_nothing(void **sta
              (int)side, (int)side);
     check_refused(player, text, message);
     // As if nothing had been said.
-    play_ok(player, "step\n");
-    play_ok(twin, "step\n");
+    check_play_ok(player, "step\n");
+    check_play_ok(twin, "step\n");
     memcpy(before, pliant_player_surface(twin), sizeof before);
     check_whole(player, before, 0);
     // More than there may be.
-    play_ok(player, "patch second tolerance 1\n");
+    check_play_ok(player, "patch second tolerance 1\n");
     snprintf(text, sizeof text, "patch second %d 0 0 0", (int)side);
     snprintf(message, sizeof message, "t.script:1:7: vertex %d belongs to patch side", (int)side);
     check_refused(player, text, message);
-    for (int i = 2; i < PLIANT_TOOL_LIMIT; i++) play_ok(player, "tool t%d plane 0 0 1 -9\n", i);
+    for (int i = 2; i < PLIANT_TOOL_LIMIT; i++)
+        check_play_ok(player, "tool t%d plane 0 0 1 -9\n", i);
     check_refused(player, "tool more plane 0 0 1 -9", "t.script:1:6: more than 8 tools at once");
     pliant_player_destroy(player);
     pliant_player_destroy(twin);
