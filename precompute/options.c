@@ -57,7 +57,7 @@ static const struct option long_options[] = {
     {"subdivide", required_argument, NULL, OPTION_SUBDIVIDE},
     {"scheme", required_argument, NULL, OPTION_SCHEME},
     {"detail", required_argument, NULL, OPTION_DETAIL},
-    {"remesh", required_argument, NULL, OPTION_REMESH},
+    {"remesh", optional_argument, NULL, OPTION_REMESH},
     {"levels", required_argument, NULL, OPTION_LEVELS},
     {"mesh-only", no_argument, NULL, OPTION_MESH_ONLY},
     {"fixed", required_argument, NULL, OPTION_FIXED},
@@ -151,6 +151,16 @@ static pliant_status word(const char *option, const char *text, const char *cons
                  words[i]);
     }
     return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "%s: expected %s, found '%s'", option, expected, text);
+}
+
+// --remesh's BASE may be left out: is this word one, or what comes behind it: another option, or
+// MESH, whose name has a dot or a slash?
+static int is_base(const char *text)
+{
+    char *end;
+    (void)strtod(text, &end);
+    if (end != text && *end == '\0') return 1;
+    return text[0] != '-' && !strpbrk(text, "./");
 }
 
 // A number in a range, or "auto".
@@ -327,6 +337,8 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case OPTION_DETAIL: status = pliant_option_integer("--detail", optarg, 1, PLIANT_LEVEL_LIMIT, &o.detail, err); break;
         case OPTION_REMESH:
             o.remeshing = PLIANT_REMESH_FIRST;
+            if (!optarg && optind < argc && is_base(argv[optind])) optarg = argv[optind++];
+            if (!optarg) break;
             status = number_or_auto("--remesh", optarg, 4, INT32_MAX / 8, &o.remesh.base_vertices, err);
             break;
         case OPTION_LEVELS:

@@ -171,12 +171,37 @@ static void options_that_do_not_go_together_are_misuse(void **state)
     }
 }
 
+static void the_base_may_be_left_out(void **state)
+{
+    (void)state;
+    check_command c;
+    char whole[1024];
+    const char *input = torus(), *output = in_folder("auto.obj");
+    check_run(&c, "%s/pliant-precompute -q --json --force --remesh auto --levels 3 --mesh-only %s -o %s",
+              check_build(), input, output);
+    if (c.status != 0) fail_msg("%s", c.errors);
+    const char *made = strstr(c.output, "\"base_vertices\"");
+    assert_non_null(made);
+    snprintf(whole, sizeof whole, "%.*s", (int)strcspn(made, ","), made);
+    static const char *const orders[] = {"--remesh --levels 3 --mesh-only %1$s -o %2$s",
+                                         "--levels 3 --mesh-only --remesh %1$s -o %2$s",
+                                         "--levels 3 --mesh-only %1$s -o %2$s --remesh"};
+    for (int i = 0; i < 3; i++) {
+        char arguments[1024];
+        snprintf(arguments, sizeof arguments, orders[i], input, output);
+        check_run(&c, "%s/pliant-precompute -q --json --force %s", check_build(), arguments);
+        if (c.status != 0) fail_msg("%s: %s", arguments, c.errors);
+        assert_non_null(strstr(c.output, whole));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_mesh_alone_is_written_and_told_of),
         cmocka_unit_test(a_model_is_remeshed_solved_and_played),
         cmocka_unit_test(small_defects_are_told_large_ones_refused),
+        cmocka_unit_test(the_base_may_be_left_out),
         cmocka_unit_test(options_that_do_not_go_together_are_misuse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL) != 0;
