@@ -116,18 +116,19 @@ typedef struct launch {
     const char *output;
 } launch;
 
-static void command_of(const launch *l, const char *more, char *line, size_t size)
+static void command_of(const char *settings, const launch *l, const char *more, char *line,
+                       size_t size)
 {
     char launcher[64] = "";
     if (l->ranks > 0) snprintf(launcher, sizeof launcher, "mpirun --quiet -n %d ", l->ranks);
-    snprintf(line, size, "%s %s%s/pliant-precompute -q %s %s %s %s -o %s", often, launcher,
+    snprintf(line, size, "%s %s%s/pliant-precompute -q %s %s %s %s -o %s", settings, launcher,
              check_build(), l->options, material, more, sample, l->output);
 }
 
-static pid_t start(const launch *l, const char *more)
+static pid_t start_with(const char *settings, const launch *l, const char *more)
 {
     char line[4096], whole[8192];
-    command_of(l, more, line, sizeof line);
+    command_of(settings, l, more, line, sizeof line);
     // env, so that the shell gives way to the program.
     snprintf(whole, sizeof whole, "exec env %s >%s 2>%s </dev/null", line, in_folder("run.out"),
              in_folder("run.err"));
@@ -139,6 +140,11 @@ static pid_t start(const launch *l, const char *more)
     }
     assert_true(child > 0);
     return child;
+}
+
+static pid_t start(const launch *l, const char *more)
+{
+    return start_with(often, l, more);
 }
 
 static int has_ended(pid_t child, int *status)
@@ -219,7 +225,7 @@ static void leave_after(const launch *l, int batches)
 static void resume(check_command *c, const launch *l, const char *more)
 {
     char line[4096];
-    command_of(l, more, line, sizeof line);
+    command_of(often, l, more, line, sizeof line);
     check_run(c, "%s", line);
 }
 
@@ -239,7 +245,7 @@ static double make_expected(const launch *l)
     const double begin = now();
     check_command c;
     char line[4096];
-    command_of(l, "--force", line, sizeof line);
+    command_of(often, l, "--force", line, sizeof line);
     check_run(&c, "%s", line);
     if (c.status) print_error("%s", c.errors);
     assert_int_equal(c.status, 0);
@@ -374,6 +380,49 @@ static void signals_finish_the_batch_and_say_how_to_go_on(void **state)
     // It may have been so near its end that it could reach it.
     if (!exists(l.output, "")) must_resume(&l);
     same_model(l.output, whole.output, 1e-5);
+}
+
+static void a_second_signal_ends_at_once(void **state)
+{
+    (void)state;
+    // One batch for all: long enough for two signals, or so on a quiet machine.
+    const launch l = {.options = "--subdivide 3", .output = in_folder("impatient.h5")};
+    static const char whole_batch[] = "PETSC_OPTIONS='-pliant_batch 1000'";
+    check_command c;
+    int code = 0, status = 0;
+    for (int turn = 0; turn < 20 && code != 128 + SIGTERM; turn++) {
+        check_run(&c, "rm -rf %s %s.partial", l.output, l.output);
+        const pid_t child = start_with(whole_batch, &l, "");
+        assert_false(await_journal(child, l.output, JOURNAL_BEGUN, &status));
+        kill(child, SIGINT);
+        while (size_of(in_folder("run.err"), "") == 0) nap(100);
+        kill(child, SIGTERM);
+        code = wait_for(child);
+        // The batch had ended before the second one came.
+        if (code != 128 + SIGTERM) assert_int_equal(code, 128 + SIGINT);
+    }
+    assert_int_equal(code, 128 + SIGTERM);
+    check_run(&c, "cat %s >&2", in_folder("run.err"));
+    check_one_line(&c, name,
+                   "interrupted: finishing what is in hand (a second signal ends at once)");
+    assert_false(exists(l.output, "") || exists(l.output, ".tmp"));
+    must_resume(&l);
+}
+
+static void a_remeshed_model_resumes(void **state)
+{
+    (void)state;
+    const launch whole = {.options = "--remesh 30 --levels 2", .output = in_folder("smooth.h5")};
+    const launch l = {.options = whole.options, .output = in_folder("rough.h5")};
+    (void)make_expected(&whole);
+    leave_after(&l, 5);
+    check_command c;
+    const launch other = {.options = "--remesh 32 --levels 2", .output = l.output};
+    resume(&c, &other, "--resume");
+    assert_int_equal(c.status, 1);
+    check_one_line(&c, name, "--remesh");
+    must_resume(&l);
+    same_model(l.output, whole.output, 0);
 }
 
 static void what_was_changed_is_refused_by_name(void **state)
@@ -549,6 +598,8 @@ int main(void)
         cmocka_unit_test(runs_killed_at_any_moment_resume_to_the_uninterrupted_file),
         cmocka_unit_test(another_number_of_ranks_goes_on),
         cmocka_unit_test(signals_finish_the_batch_and_say_how_to_go_on),
+        cmocka_unit_test(a_second_signal_ends_at_once),
+        cmocka_unit_test(a_remeshed_model_resumes),
         cmocka_unit_test(what_was_changed_is_refused_by_name),
         cmocka_unit_test(a_second_run_is_refused),
         cmocka_unit_test(a_full_disk_keeps_what_is_done),
