@@ -45,8 +45,9 @@ static void print(FILE *out, const pliant_options *o, const pliant_problem *p, u
             (unsigned long long)pliant_checksum(0, p->held, (size_t)p->vertex_count));
     fprintf(out, "--young = %.17g\n--poisson = %.17g\n--density = %.17g\n", o->material.young,
             o->material.poisson, o->material.density);
-    fprintf(out, "--method = %d\n--order = %d\n--solver = %d\n--volume contents = %016llx\n",
-            (int)o->method, o->order, (int)o->solver, (unsigned long long)volume);
+    fprintf(out, "--method = %d\n--order = %d\n--solver = %d\n", (int)o->method, o->order, (int)o->solver);
+    fprintf(out, "--growth = %.17g\n--volume contents = %016llx\n", o->growth,
+            (unsigned long long)volume);
     for (int32_t k = 0; k < o->region_count; k++)
         fprintf(out, "--material %s = %.17g:%.17g:%.17g\n", o->regions[k].name,
                 o->regions[k].material.young, o->regions[k].material.poisson,

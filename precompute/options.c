@@ -2,6 +2,7 @@
 #include "options.h"
 
 #include "mesh/region.h"
+#include "fem/size_field.h"
 #include "remesh/mesh_output.h"
 
 #include "pliant/error.h"
@@ -29,6 +30,7 @@ enum {
     OPTION_DENSITY,
     OPTION_METHOD,
     OPTION_VOLUME,
+    OPTION_GROWTH,
     OPTION_ORDER,
     OPTION_SOLVER,
     OPTION_MATERIAL,
@@ -67,6 +69,7 @@ static const struct option long_options[] = {
     {"density", required_argument, NULL, OPTION_DENSITY},
     {"method", required_argument, NULL, OPTION_METHOD},
     {"volume", required_argument, NULL, OPTION_VOLUME},
+    {"growth", required_argument, NULL, OPTION_GROWTH},
     {"order", required_argument, NULL, OPTION_ORDER},
     {"solver", required_argument, NULL, OPTION_SOLVER},
     {"material", required_argument, NULL, OPTION_MATERIAL},
@@ -110,6 +113,16 @@ static pliant_status number(const char *option, const char *text, double low, do
                                 option, low, text);
     return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
                             "%s: expected a number over %g and under %g, found %s", option, low, high, text);
+}
+
+// From 1 to 2, both included.
+static pliant_status growth(const char *option, const char *text, double *value, pliant_error *err)
+{
+    const pliant_status status = number(option, text, -INFINITY, INFINITY, value, err);
+    if (status == PLIANT_OK && !(*value >= 1 && *value <= 2))
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                "%s: expected a number from 1 (all alike) to 2, found %s", option, text);
+    return status;
 }
 
 // A level's digits, or NULL: the rest of the text.
@@ -218,6 +231,7 @@ static option_kind kind_of(int code)
     case OPTION_RESUME:
     case OPTION_DENSE: return KIND_GREENS;
     case OPTION_VOLUME:
+    case OPTION_GROWTH:
     case OPTION_ORDER:
     case OPTION_SOLVER:
     case OPTION_MATERIAL: return KIND_FEM;
@@ -306,7 +320,7 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     static const char *const methods[] = {"bem", "fem"};
     static const char *const solvers[] = {"auto", "direct", "multigrid"};
     pliant_status status = PLIANT_OK;
-    int choice = 0, scheme_given = 0, filling_given = 0, levels_given = 0;
+    int choice = 0, scheme_given = 0, filling_given = 0, levels_given = 0, growth_given = 0;
     const char *given[KIND_COUNT] = {NULL};
     *action = PLIANT_OPTIONS_RUN;
     optind = 0;  // starts afresh, so that parsing can be tested in one process
@@ -382,6 +396,10 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
             o.method = (pliant_method)choice;
             break;
         case OPTION_VOLUME: o.volume = optarg; break;
+        case OPTION_GROWTH:
+            growth_given = 1;
+            status = growth("--growth", optarg, &o.growth, err);
+            break;
         case OPTION_ORDER: status = pliant_option_integer("--order", optarg, 1, 2, &o.order, err); break;
         case OPTION_SOLVER:
             status = word("--solver", optarg, solvers, 3, &choice, err);
@@ -407,6 +425,9 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
     if (!o.output) return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "expected -o MODEL.h5; see --help");
     if (o.dense && strcmp(o.dense, o.output) == 0)
         return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--dense and -o name the same file '%s'", o.dense);
+    if (!growth_given) o.growth = pliant_size_field_growth(o.order);
+    if (growth_given && o.volume)
+        return pliant_error_set(err, PLIANT_ERR_ARGUMENT, "--growth is for the inside that is meshed, --volume has one");
     if ((status = check_remesh(&o, levels_given, err)) < 0) return status;
     if ((status = check_kinds(&o, given, err)) < 0) return status;
     if (o.fixed_expression) {

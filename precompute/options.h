@@ -83,6 +83,7 @@ typedef struct pliant_options {
     const char *fixed_expression, *fixed_list;  // either may be NULL
     pliant_method method;
     const char *volume;            // a Gmsh file; NULL: the inside is meshed
+    double growth;                 // of tetrahedra inwards, 1 to 2
     int32_t order;                 // of tetrahedra, 1 or 2
     pliant_solver_choice solver;
     int32_t region_count;

@@ -73,6 +73,13 @@ static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_op
             s->times.solve, s->times.transform, s->times.compress);
 }
 
+static void print_elements(FILE *out, const pliant_options *options)
+{
+    fprintf(out, "element_order = %d\n", options->order);
+    if (options->volume) fprintf(out, "volume = %s\n", options->volume);
+    else fprintf(out, "element_growth = %.9g\n", options->growth);
+}
+
 static void print_lattice(FILE *out, const pliant_run_summary *s, const pliant_options *options)
 {
     fprintf(out,
@@ -90,7 +97,8 @@ char *pliant_provenance_text(const pliant_run_summary *summary, const pliant_mes
                              const pliant_options *options, const char *command_line)
 {
     const size_t size = FIXED_TEXT + strlen(command_line) + strlen(options->mesh) +
-                        (options->lattice_mass ? strlen(options->lattice_mass) : 0);
+                        (options->lattice_mass ? strlen(options->lattice_mass) : 0) +
+                        (options->volume ? strlen(options->volume) : 0);
     char *text = calloc(size, 1);
     FILE *out = text ? fmemopen(text, size, "w") : NULL;
     if (!out) {
@@ -99,6 +107,8 @@ char *pliant_provenance_text(const pliant_run_summary *summary, const pliant_mes
     }
     print_run(out, summary, mesh, options, command_line);
     if (options->greens == PLIANT_GREENS_SOLVE) print_greens(out, summary, options);
+    if (options->greens == PLIANT_GREENS_SOLVE && options->method == PLIANT_METHOD_FEM)
+        print_elements(out, options);
     if (options->lattice_cells > 0) print_lattice(out, summary, options);
     fclose(out);
     return text;

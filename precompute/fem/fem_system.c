@@ -58,7 +58,8 @@ static pliant_status make_inside(fem_system *s, pliant_error *err)
                                    .mesh_name = o->mesh,
                                    .file = o->volume,
                                    .region_count = o->region_count,
-                                   .region_names = names};
+                                   .region_names = names,
+                                   .growth = o->growth};
     const pliant_status status = pliant_volume_create(&def, &s->tetrahedra, err);
     if (status < 0 || o->order == 1) return status;
     return pliant_tetrahedra_raise(s->tetrahedra, err);

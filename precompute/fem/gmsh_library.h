@@ -15,7 +15,8 @@
     X(gmshInitialize) X(gmshFinalize) X(gmshFree) X(gmshOpen) X(gmshClear) X(gmshOptionSetNumber) \
     X(gmshModelAdd) X(gmshModelGetEntities) X(gmshModelGetPhysicalGroups) \
     X(gmshModelGetPhysicalGroupsForEntity) X(gmshModelGetPhysicalName) X(gmshModelAddDiscreteEntity) \
-    X(gmshModelMeshGenerate) X(gmshModelMeshAddNodes) X(gmshModelMeshGetNodes) \
+    X(gmshModelMeshGenerate) X(gmshModelMeshSetSizeCallback) X(gmshModelMeshRemoveSizeCallback) \
+    X(gmshModelMeshAddNodes) X(gmshModelMeshGetNodes) \
     X(gmshModelMeshAddElementsByType) X(gmshModelMeshGetElementTypes) X(gmshModelMeshGetElementsByType) \
     X(gmshModelGeoAddSurfaceLoop) X(gmshModelGeoAddVolume) X(gmshModelGeoSynchronize) \
     X(gmshLoggerGetLastError)

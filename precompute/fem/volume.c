@@ -5,6 +5,7 @@
 #include "fem/volume.h"
 
 #include "fem/gmsh_library.h"
+#include "fem/size_field.h"
 #include "mesh/components.h"
 
 #include "pliant/error.h"
@@ -306,16 +307,34 @@ static pliant_status hand_on(const pliant_volume_def *def, const inside *in,
 
 // ---- Meshing the inside ----
 
+// gmsh's question how long edges should be at a place. 4.9 and later also tell their own idea.
+#if GMSH_API_VERSION_MAJOR > 4 || GMSH_API_VERSION_MINOR > 8
+static double size_at(int dimension, int tag, double x, double y, double z, double own, void *data)
+#else
+static double size_at(int dimension, int tag, double x, double y, double z, void *data)
+#endif
+{
+    (void)dimension;
+    (void)tag;
+#if GMSH_API_VERSION_MAJOR > 4 || GMSH_API_VERSION_MINOR > 8
+    (void)own;
+#endif
+    return pliant_size_field_at(data, (const double[3]){x, y, z});
+}
+
 // One body by one algorithm, checked against its own boundary when all are there.
 static pliant_status mesh_body(const pliant_gmsh_library *gmsh, const pliant_volume_def *def,
                                const pliant_components *parts, int32_t body, double algorithm,
-                               inside *in, pliant_error *err)
+                               pliant_size_field *sizes, inside *in, pliant_error *err)
 {
     int code;
     char reason[256];
     gmsh->gmshClear(&code);
     gmsh->gmshModelAdd("solid", &code);
     gmsh->gmshOptionSetNumber("Mesh.Algorithm3D", algorithm, &code);
+    // Else the surface's sizes are carried inwards, and the smaller ones win.
+    gmsh->gmshOptionSetNumber("Mesh.MeshSizeExtendFromBoundary", 0, &code);
+    gmsh->gmshModelMeshSetSizeCallback(size_at, sizes, &code);
     if (!add_body(gmsh, def->surface, parts, body)) code = 1;
     else gmsh->gmshModelMeshGenerate(3, &code);
     if (code) {
@@ -343,13 +362,15 @@ static pliant_status mesh_body(const pliant_gmsh_library *gmsh, const pliant_vol
 
 static pliant_status try_algorithm(const pliant_gmsh_library *gmsh, const pliant_volume_def *def,
                                    const pliant_components *parts, double algorithm,
-                                   pliant_tetrahedra **tetrahedra, pliant_error *err)
+                                   pliant_size_field *sizes, pliant_tetrahedra **tetrahedra,
+                                   pliant_error *err)
 {
     inside in = {.node_count = def->surface->vertex_count};
     pliant_status status = PLIANT_OK;
     // Bodies one by one: they share nothing.
     for (int32_t k = 0; k < parts->count && status == PLIANT_OK; k++)
-        if (parts->depth[k] % 2 == 0) status = mesh_body(gmsh, def, parts, k, algorithm, &in, err);
+        if (parts->depth[k] % 2 == 0)
+            status = mesh_body(gmsh, def, parts, k, algorithm, sizes, &in, err);
     if (status == PLIANT_OK) status = hand_on(def, &in, tetrahedra, err);
     discard(&in);
     return status;
@@ -359,15 +380,22 @@ static pliant_status mesh_inside(const pliant_gmsh_library *gmsh, const pliant_v
                                  pliant_tetrahedra **tetrahedra, pliant_error *err)
 {
     pliant_components *parts = NULL;
-    pliant_status status = pliant_components_create(def->surface, def->mesh_name, &parts, err);
-    if (status < 0) return status;
+    pliant_size_field *sizes = NULL;
+    pliant_status status = pliant_size_field_create(def->surface, def->growth, &sizes, err);
+    if (status == PLIANT_OK)
+        status = pliant_components_create(def->surface, def->mesh_name, &parts, err);
+    if (status < 0) {
+        pliant_size_field_destroy(sizes);
+        return status;
+    }
     pliant_error reasons[ALGORITHMS] = {{""}};
     // Some of gmsh's parts print past its own settings.
     fflush(stdout);
     const int quiet = open("/dev/null", O_WRONLY), output = dup(STDOUT_FILENO);
     if (quiet >= 0 && output >= 0) dup2(quiet, STDOUT_FILENO);
     for (int i = 0; i < ALGORITHMS; i++) {
-        status = try_algorithm(gmsh, def, parts, algorithms[i].number, tetrahedra, &reasons[i]);
+        status = try_algorithm(gmsh, def, parts, algorithms[i].number, sizes, tetrahedra,
+                               &reasons[i]);
         if (status == PLIANT_OK || status == PLIANT_ERR_MEMORY) break;
     }
     fflush(stdout);
@@ -375,6 +403,9 @@ static pliant_status mesh_inside(const pliant_gmsh_library *gmsh, const pliant_v
     if (output >= 0) close(output);
     if (quiet >= 0) close(quiet);
     pliant_components_destroy(parts);
+    pliant_size_field_destroy(sizes);
+    int code;
+    gmsh->gmshModelMeshRemoveSizeCallback(&code);
     if (status < 0)
         return pliant_error_set(err, status,
                                 "%s: its inside cannot be cut into tetrahedra (%s: %.120s; %s: "

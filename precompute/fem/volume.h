@@ -11,6 +11,7 @@ typedef struct pliant_volume_def {
     const char *file;       // a Gmsh file with the tetrahedra; NULL: mesh the inside
     int32_t region_count;
     const char *const *region_names;
+    double growth;  // of elements with their distance from the surface (size_field.h), 1: none
 } pliant_volume_def;
 
 // Linear tetrahedra that keep the surface. A file's surface nodes are matched by place, to 1e-6 of

@@ -2,7 +2,7 @@
 #include "lattice/masses.h"
 
 #include "lattice/cell_measure.h"
-#include "lattice/nearest.h"
+#include "mesh/nearest.h"
 #include "mesh/file_bytes.h"
 #include "mesh/text_cursor.h"
 

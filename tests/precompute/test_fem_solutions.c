@@ -6,6 +6,7 @@
 #include "bem/kelvin.h"
 #include "discretisation.h"
 #include "fem/element.h"
+#include "fem/size_field.h"
 #include "fem/stiffness.h"
 #include "fem/volume.h"
 #include "right_hand.h"
@@ -23,7 +24,7 @@ static pliant_tetrahedra *fill_mesh(const pliant_mesh *mesh, int order)
 {
     pliant_error err;
     pliant_tetrahedra *t = NULL;
-    const pliant_volume_def def = {.surface = mesh, .mesh_name = "test"};
+    const pliant_volume_def def = {.surface = mesh, .mesh_name = "test", .growth = pliant_size_field_growth(order)};
     check_ok(pliant_volume_create(&def, &t, &err), &err);
     if (order == 2) check_ok(pliant_tetrahedra_raise(t, &err), &err);
     return t;
@@ -369,7 +370,10 @@ static solved solve_mesh(const pliant_mesh *mesh, const char *fixed, const char 
     check_ok(pliant_options_parse((int)(sizeof argv / sizeof *argv), (char **)(uintptr_t)argv,
                                   &options, &action, &err),
              &err);
-    if (order) options.order = order;
+    if (order) {
+        options.order = order;
+        options.growth = pliant_size_field_growth(order);
+    }
     pliant_progress silent = pliant_progress_create(NULL);
     solved s = {0};
     assert_int_equal(pliant_problem_create(PETSC_COMM_SELF, &options, &silent, &s.p, &err), 0);

@@ -5,7 +5,7 @@
 #include "lattice/cell_measure.h"
 #include "lattice/lattice_data.h"
 #include "lattice/masses.h"
-#include "lattice/nearest.h"
+#include "mesh/nearest.h"
 #include "surfaces.h"
 
 #include <math.h>

@@ -302,6 +302,9 @@ static void what_cannot_be_is_refused_in_one_line(void **state)
     refuse("--solver direct", 2, "--solver goes with --method fem");
     refuse("--volume x.msh", 2, "--volume goes with --method fem");
     refuse("--method fem --order 3", 2, "--order");
+    refuse("--growth 1.2", 2, "--growth goes with --method fem");
+    refuse("--method fem --growth 0.9", 2, "--growth: expected a number from 1 (all alike) to 2, found 0.9");
+    refuse("--method fem --volume a.msh --growth 1.1", 2, "--growth is for the inside that is meshed");
     refuse("--method fem --solver fast", 2, "expected auto, direct or multigrid");
     refuse("--method fem --material a:1:0.3:1", 2, "--material goes with --volume");
     refuse("--method fem --volume x.msh --material a:1:0.3", 2, "expected NAME:E:NU:RHO");

@@ -1,5 +1,5 @@
 // nearest.c: the nearest of a set of points, by a k-d tree.
-#include "lattice/nearest.h"
+#include "mesh/nearest.h"
 
 #include "pliant/error.h"
 
