@@ -4,6 +4,7 @@
 #include "bem/bem.h"
 #include "dense_system.h"
 #include "interruption.h"
+#include "node_memory.h"
 #include "refusal.h"
 #include "right_hand.h"
 
@@ -34,13 +35,41 @@ typedef struct sample_row {
 
 typedef struct boundary_system {
     MPI_Comm comm;
+    pliant_solver_groups groups;
     const pliant_problem *problem;
     const pliant_options *options;
     int32_t columns, batch;
+    int32_t group_batch;  // the most columns of a batch that a group has
     pliant_dense_system *dense;
     sample_row sample;
     double worst;  // backward error of this rank's sampled rows and columns
 } boundary_system;
+
+// Of the memory available, for matrices and right-hand sides.
+static const double memory_part = 0.9;
+
+// Collective: one group a machine while every machine can hold a matrix of its own, since ScaLAPACK
+// over a network is slow at what LAPACK does at full speed; else one for all.
+static PetscErrorCode choose_groups(boundary_system *s)
+{
+    PetscFunctionBegin;
+    if (s->options->groups > 0) {
+        PetscCall(pliant_solver_groups_create(s->comm, s->options->groups, &s->groups));
+        PetscFunctionReturn(0);
+    }
+    PetscCall(pliant_solver_groups_create_by_machine(s->comm, &s->groups));
+    if (s->groups.count == 1) PetscFunctionReturn(0);
+    pliant_dense_plan dense;
+    PetscCall(pliant_dense_system_plan(s->groups.comm, s->problem->vertex_count, s->columns,
+                                       s->batch, &dense));
+    const double needed = dense.matrix_bytes + dense.right_hand_bytes + dense.batch_bytes;
+    int fits = needed < memory_part * pliant_node_available(), all;
+    PetscCallMPI(MPI_Allreduce(&fits, &all, 1, MPI_INT, MPI_MIN, s->comm));
+    if (all) PetscFunctionReturn(0);
+    PetscCall(pliant_solver_groups_destroy(&s->groups));
+    PetscCall(pliant_solver_groups_create(s->comm, 1, &s->groups));
+    PetscFunctionReturn(0);
+}
 
 static PetscErrorCode create(MPI_Comm comm, const pliant_problem *problem,
                              const pliant_options *options, int32_t batch,
@@ -57,6 +86,8 @@ static PetscErrorCode create(MPI_Comm comm, const pliant_problem *problem,
                            .columns = pliant_right_hand_count(problem, options->blocks),
                            .batch = batch};
     *system = s;
+    PetscCall(choose_groups(s));
+    s->group_batch = pliant_solver_groups_most(&s->groups, batch);
     PetscFunctionReturn(0);
 }
 
@@ -68,6 +99,7 @@ static PetscErrorCode destroy(void **system)
     PetscCall(PetscFree(s->sample.right));
     PetscCall(PetscFree(s->sample.A));
     PetscCall(pliant_dense_system_destroy(&s->dense));
+    PetscCall(pliant_solver_groups_destroy(&s->groups));
     PetscCall(PetscFree(*system));
     PetscFunctionReturn(0);
 }
@@ -77,17 +109,25 @@ static PetscErrorCode plan(const void *system, pliant_solve_plan *out)
     PetscFunctionBegin;
     const boundary_system *s = system;
     pliant_dense_plan dense;
-    PetscCall(
-        pliant_dense_system_plan(s->comm, s->problem->vertex_count, s->columns, s->batch, &dense));
+    PetscCall(pliant_dense_system_plan(s->groups.comm, s->problem->vertex_count, s->columns,
+                                       s->group_batch, &dense));
     const double unknowns = 3.0 * s->problem->vertex_count;
     *out = (pliant_solve_plan){.solver = dense.kind,
-                               .matrix_bytes = dense.matrix_bytes,
-                               .right_hand_bytes = dense.right_hand_bytes,
-                               .batch_bytes = dense.batch_bytes,
-                               .factor_flops = 2 * unknowns * unknowns * unknowns / 3,
+                               .groups = s->groups.count,
+                               .matrix_bytes = s->groups.count * dense.matrix_bytes,
+                               .right_hand_bytes = s->groups.count * dense.right_hand_bytes,
+                               .batch_bytes = s->groups.count * dense.batch_bytes,
+                               .factor_flops =
+                                   s->groups.count * 2 * unknowns * unknowns * unknowns / 3,
                                .solve_flops = 2 * unknowns * unknowns * 3 * s->columns};
     snprintf(out->system, sizeof out->system, "dense system of %.0f unknowns", unknowns);
     PetscFunctionReturn(0);
+}
+
+static const pliant_solver_groups *groups(const void *system)
+{
+    const boundary_system *s = system;
+    return &s->groups;
 }
 
 static PetscErrorCode assemble(void *system, pliant_progress *progress, pliant_error *err)
@@ -96,8 +136,8 @@ static PetscErrorCode assemble(void *system, pliant_progress *progress, pliant_e
     boundary_system *s = system;
     const pliant_problem *p = s->problem;
     const pliant_blocks blocks = s->options->blocks;
-    PetscCall(
-        pliant_dense_system_create(s->comm, p->vertex_count, s->columns, s->batch, &s->dense));
+    PetscCall(pliant_dense_system_create(s->groups.comm, p->vertex_count, s->columns,
+                                         s->group_batch, &s->dense));
     const pliant_dense_rows rows = pliant_dense_system_rows(s->dense);
     const size_t unknowns = 3 * (size_t)p->vertex_count, ld = 3 * (size_t)assembly_step;
     double *B;
@@ -151,6 +191,7 @@ static PetscErrorCode factor(void *system, pliant_progress *progress, pliant_err
     pliant_progress_begin(progress, "factor", 0);
     int singular;
     PetscCall(pliant_dense_system_factor(s->dense, &singular));
+    PetscCall(pliant_node_wait(s->comm));
     pliant_status status = PLIANT_OK;
     if (singular)
         status = pliant_error_set(
@@ -189,7 +230,13 @@ static PetscErrorCode solve(void *system, int32_t first, int32_t count, pliant_c
     PetscFunctionBegin;
     (void)err;
     boundary_system *s = system;
-    PetscCall(pliant_dense_system_solve(s->dense, first, count, share));
+    int32_t begin, end;
+    pliant_solver_groups_part(&s->groups, count, s->groups.index, &begin, &end);
+    *share = (pliant_column_share){.begin = begin, .end = begin};
+    if (begin == end) PetscFunctionReturn(0);
+    PetscCall(pliant_dense_system_solve(s->dense, first + begin, end - begin, share));
+    share->begin += begin;
+    share->end += begin;
     // One column of every batch is enough to notice a bad factorization.
     if (share->end > share->begin)
         s->worst = fmax(s->worst, sample_residual(&s->sample, s->problem->vertex_count,
@@ -202,7 +249,9 @@ static PetscErrorCode solve_gravity(void *system, pliant_column_share *share, pl
     PetscFunctionBegin;
     (void)err;
     boundary_system *s = system;
-    PetscCall(pliant_dense_system_solve_gravity(s->dense, share));
+    // The first group's alone.
+    *share = (pliant_column_share){0};
+    if (s->groups.index == 0) PetscCall(pliant_dense_system_solve_gravity(s->dense, share));
     PetscFunctionReturn(0);
 }
 
@@ -219,6 +268,7 @@ const pliant_discretisation pliant_boundary_system = {
     .name = "bem",
     .create = create,
     .plan = plan,
+    .groups = groups,
     .assemble = assemble,
     .factor = factor,
     .solve = solve,

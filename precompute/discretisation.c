@@ -12,8 +12,3 @@ const pliant_discretisation *pliant_discretisation_of(pliant_method method)
     };
     return methods[method];
 }
-
-int32_t pliant_column_split(int64_t count, int rank, int size)
-{
-    return (int32_t)(count * rank / size);
-}

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "problem.h"
+#include "solver_groups.h"
 
 #include <stddef.h>
 
@@ -20,6 +21,7 @@ typedef struct pliant_column_share {
 // Bytes that a system will need, all ranks together, so that a run can be refused before it starts.
 typedef struct pliant_solve_plan {
     const char *solver;   // a word, for the summary
+    int32_t groups;
     char system[160];     // "dense system of 1926 unknowns", for a note
     double matrix_bytes;  // with its factors
     double right_hand_bytes;
@@ -28,7 +30,8 @@ typedef struct pliant_solve_plan {
     double solve_flops;   // of all columns; 0: not known
 } pliant_solve_plan;
 
-// Every function is collective. `system` is the method's own.
+// Every function is collective over all ranks. `system` is the method's own; it has dealt the ranks out
+// to groups when it is created, each with an operator of its own.
 typedef struct pliant_discretisation {
     const char *name;
     // Look at the problem; both are borrowed until destroy. `batch` columns are solved for at once.
@@ -36,10 +39,12 @@ typedef struct pliant_discretisation {
                              const pliant_options *options, int32_t batch,
                              pliant_progress *progress, void **system, pliant_error *err);
     PetscErrorCode (*plan)(const void *system, pliant_solve_plan *plan);
+    const pliant_solver_groups *(*groups)(const void *system);  // borrowed until destroy
     PetscErrorCode (*assemble)(void *system, pliant_progress *progress, pliant_error *err);
     // PLIANT_REFUSED when the system is singular.
     PetscErrorCode (*factor)(void *system, pliant_progress *progress, pliant_error *err);
-    // Columns first .. first + count - 1, count <= batch.
+    // Columns first .. first + count - 1, count <= batch; shares are those of
+    // pliant_solver_groups_share.
     PetscErrorCode (*solve)(void *system, int32_t first, int32_t count, pliant_column_share *share,
                             pliant_error *err);
     // The three columns of a unit acceleration's body force, as one.
@@ -50,7 +55,3 @@ typedef struct pliant_discretisation {
 } pliant_discretisation;
 
 const pliant_discretisation *pliant_discretisation_of(pliant_method method);
-
-// Where rank `rank` begins of `count` columns (or rows) dealt out in order: its share ends where
-// the next begins.
-int32_t pliant_column_split(int64_t count, int rank, int size);

@@ -37,11 +37,13 @@ int32_t pliant_greens_batch(MPI_Comm comm)
 }
 
 void pliant_greens_share(const pliant_greens *greens, int32_t column_count, int32_t first, int rank,
-                         int size, int32_t *begin, int32_t *end)
+                         int32_t *begin, int32_t *end)
 {
-    const int64_t left = column_count - first, count = left < greens->batch ? left : greens->batch;
-    *begin = first + (int32_t)(count * rank / size);
-    *end = first + (int32_t)(count * (rank + 1) / size);
+    const int32_t left = column_count - first;
+    pliant_solver_groups_share(&greens->groups, left < greens->batch ? left : greens->batch, rank,
+                               begin, end);
+    *begin += first;
+    *end += first;
 }
 
 int pliant_greens_free_rows(pliant_block_name block)
@@ -99,8 +101,7 @@ void pliant_greens_streams(const pliant_problem *problem, const pliant_options *
 }
 
 // This rank's columns of a block from what an earlier run has left, in the order of solving.
-static pliant_status restore_block(pliant_greens *g, pliant_block_name block, int rank, int size,
-                                   pliant_error *err)
+static pliant_status restore_block(pliant_greens *g, pliant_block_name block, pliant_error *err)
 {
     const int32_t level = g->problem->levels.last;
     const pliant_column_domain domain =
@@ -109,7 +110,7 @@ static pliant_status restore_block(pliant_greens *g, pliant_block_name block, in
     const int32_t done = pliant_partial_done(g->partial, domain);
     for (int32_t first = 0; first < done; first += g->batch) {
         int32_t begin, end;
-        pliant_greens_share(g, count, first, rank, size, &begin, &end);
+        pliant_greens_share(g, count, first, g->groups.world_rank, &begin, &end);
         for (int32_t column = begin; column < end; column++) {
             pliant_spooled spooled, kept;
             const int is_spooled = pliant_partial_find(g->partial, 2 * block, column, &spooled);
@@ -126,14 +127,11 @@ static pliant_status restore_block(pliant_greens *g, pliant_block_name block, in
 static PetscErrorCode restore(pliant_greens *g, pliant_error *err)
 {
     PetscFunctionBegin;
-    PetscMPIInt rank, size;
-    PetscCallMPI(MPI_Comm_rank(g->comm, &rank));
-    PetscCallMPI(MPI_Comm_size(g->comm, &size));
     g->residual = pliant_partial_residual(g->partial);
     pliant_status status = PLIANT_OK;
     for (int b = 0; b < PLIANT_BLOCK_COUNT && status == PLIANT_OK; b++)
         if (g->blocks[b][g->problem->levels.last])
-            status = restore_block(g, (pliant_block_name)b, rank, size, err);
+            status = restore_block(g, (pliant_block_name)b, err);
     PliantCall(g->comm, status, err);
 
     const size_t free_size = 9 * (size_t)g->problem->free_count,
@@ -149,8 +147,9 @@ static PetscErrorCode restore(pliant_greens *g, pliant_error *err)
     PetscFunctionReturn(0);
 }
 
-PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
-                                    const pliant_options *options, const char *folder,
+PetscErrorCode pliant_greens_create(const pliant_solver_groups *groups,
+                                    const pliant_problem *problem, const pliant_options *options,
+                                    const char *folder,
                                     pliant_partial *partial, pliant_greens **greens,
                                     pliant_error *err)
 {
@@ -158,7 +157,9 @@ PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem
     pliant_greens *g;
     PetscCall(PetscNew(&g));
     *greens = g;
+    const MPI_Comm comm = groups->world;
     g->comm = comm;
+    PetscCall(pliant_solver_groups_duplicate(groups, &g->groups));
     g->problem = problem;
     g->compression = options->compression;
     g->folder = folder;
@@ -187,6 +188,7 @@ PetscErrorCode pliant_greens_destroy(pliant_greens **greens)
     free(g->gravity_free);
     for (int b = 0; b < PLIANT_BLOCK_COUNT; b++)
         for (int32_t l = 0; l <= PLIANT_LEVEL_LIMIT; l++) pliant_compression_destroy(g->blocks[b][l]);
+    PetscCall(pliant_solver_groups_destroy(&g->groups));
     PetscCall(PetscFree(*greens));
     PetscFunctionReturn(0);
 }

@@ -24,6 +24,7 @@ typedef struct pliant_greens {
     const char *folder;       // of spools; borrowed until compress
     pliant_partial *partial;  // where solved columns wait; NULL: in spools that go with the run
     int32_t batch;            // columns solved for at once
+    pliant_solver_groups groups;
     // By block and level; NULL where not asked for, or not yet there: coarser levels come with
     // compress.
     pliant_compression *blocks[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
@@ -47,11 +48,12 @@ int32_t pliant_greens_column_count(const pliant_problem *problem, pliant_block_n
 void pliant_greens_streams(const pliant_problem *problem, const pliant_options *options,
                            int32_t domain[PLIANT_PARTIAL_STREAMS]);
 
-// Collective: compressors for the blocks asked for, with spools in `folder` (borrowed until
+// Collective: compressors for the blocks asked for, for columns that `groups` solve for, with spools in `folder` (borrowed until
 // compress). Solved columns go to `partial` (borrowed until destroy, may be NULL), and what is in
 // it is taken in.
-PetscErrorCode pliant_greens_create(MPI_Comm comm, const pliant_problem *problem,
-                                    const pliant_options *options, const char *folder,
+PetscErrorCode pliant_greens_create(const pliant_solver_groups *groups,
+                                    const pliant_problem *problem, const pliant_options *options,
+                                    const char *folder,
                                     pliant_partial *partial, pliant_greens **greens,
                                     pliant_error *err);
 PetscErrorCode pliant_greens_destroy(pliant_greens **greens);
@@ -68,4 +70,4 @@ PetscErrorCode pliant_greens_compress(pliant_greens *greens, pliant_progress *pr
 // The batches of a level's columns, the same on every rank and when they are written.
 // This rank's share of the batch that begins at position `first`.
 void pliant_greens_share(const pliant_greens *greens, int32_t column_count, int32_t first, int rank,
-                         int size, int32_t *begin, int32_t *end);
+                         int32_t *begin, int32_t *end);

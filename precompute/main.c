@@ -156,8 +156,8 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
                t->read, t->lattice, t->write, t->total);
         return;
     }
-    printf(", \"free\": %d, \"fixed\": %d, \"solver\": \"%s\", \"residual\": %.3g, \"memory_bytes\": %.0f",
-           s->free_count, s->fixed_count, s->solver, s->residual, s->memory_bytes);
+    printf(", \"free\": %d, \"fixed\": %d, \"solver\": \"%s\", \"groups\": %d, \"residual\": %.3g, \"memory_bytes\": %.0f",
+           s->free_count, s->fixed_count, s->solver, s->groups, s->residual, s->memory_bytes);
     if (s->detail_steps > 0)
         printf(", \"detail\": {\"steps\": %d, \"vertices\": %d, \"rms\": %.6g, \"largest\": %.6g, "
                "\"tangential_rms\": %.6g, \"tangential_largest\": %.6g, \"least_sine\": %.3g}",

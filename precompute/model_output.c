@@ -77,7 +77,7 @@ static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g,
         pliant_status status = PLIANT_OK;
         for (int r = 0; r < size; r++) {
             int32_t begin, end;
-            pliant_greens_share(g, columns, first, r, size, &begin, &end);
+            pliant_greens_share(g, columns, first, r, &begin, &end);
             const uint64_t count = offset[end] - offset[begin];
             if (count == 0 || (rank != r && rank != 0)) continue;
             const int32_t *rows = NULL;
@@ -103,7 +103,7 @@ static PetscErrorCode write_columns(pliant_writer *writer, pliant_greens *g,
             }
         }
         int32_t begin, end;
-        pliant_greens_share(g, columns, first, rank, size, &begin, &end);
+        pliant_greens_share(g, columns, first, rank, &begin, &end);
         next += end - begin;
         if (status == PLIANT_OK) status = pliant_interruption_check(err);
         const PetscErrorCode code = pliant_refusal_agree(g->comm, status, err);

@@ -3,8 +3,11 @@
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <malloc.h>
 #include <sched.h>
+#include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <time.h>
@@ -98,6 +101,20 @@ void pliant_node_threads(int threads)
     if (set) set(threads);
 }
 
+void pliant_node_keep_heap(double bytes)
+{
+#ifdef __GLIBC__
+    (void)mallopt(M_MMAP_MAX, 0);
+    (void)mallopt(M_TRIM_THRESHOLD, -1);
+#endif
+    // Nothing of it is touched, so that it costs no memory.
+    char *heap = malloc((size_t)bytes);
+    const uintptr_t page = 1 << 21, begin = ((uintptr_t)heap + page - 1) / page * page,
+                    end = (uintptr_t)heap + (uintptr_t)bytes;
+    if (heap && begin < end) (void)madvise((void *)begin, end - begin, MADV_HUGEPAGE);
+    free(heap);
+}
+
 // The first number in a file, or -1.
 static double number_in(const char *path, const char *key)
 {
@@ -113,6 +130,10 @@ static double number_in(const char *path, const char *key)
 
 double pliant_node_available(void)
 {
+    PetscReal told = 0;
+    PetscBool is_told = PETSC_FALSE;
+    (void)PetscOptionsGetReal(NULL, NULL, "-pliant_memory", &told, &is_told);
+    if (is_told) return 1e9 * told;
     double available = 1024 * number_in("/proc/meminfo", "MemAvailable:");
     const double limit = number_in("/sys/fs/cgroup/memory.max", "");
     const double used = number_in("/sys/fs/cgroup/memory.current", "");

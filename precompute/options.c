@@ -33,6 +33,7 @@ enum {
     OPTION_GROWTH,
     OPTION_ORDER,
     OPTION_SOLVER,
+    OPTION_GROUPS,
     OPTION_MATERIAL,
     OPTION_RMS,
     OPTION_MAX,
@@ -72,6 +73,7 @@ static const struct option long_options[] = {
     {"growth", required_argument, NULL, OPTION_GROWTH},
     {"order", required_argument, NULL, OPTION_ORDER},
     {"solver", required_argument, NULL, OPTION_SOLVER},
+    {"groups", required_argument, NULL, OPTION_GROUPS},
     {"material", required_argument, NULL, OPTION_MATERIAL},
     {"rms", required_argument, NULL, OPTION_RMS},
     {"max", required_argument, NULL, OPTION_MAX},
@@ -229,6 +231,7 @@ static option_kind kind_of(int code)
     case OPTION_CONSTRAINT_LEVELS:
     case OPTION_BLOCKS:
     case OPTION_RESUME:
+    case OPTION_GROUPS:
     case OPTION_DENSE: return KIND_GREENS;
     case OPTION_VOLUME:
     case OPTION_GROWTH:
@@ -399,6 +402,10 @@ pliant_status pliant_options_parse(int argc, char **argv, pliant_options *option
         case OPTION_GROWTH:
             growth_given = 1;
             status = growth("--growth", optarg, &o.growth, err);
+            break;
+        case OPTION_GROUPS:
+            if (strcmp(optarg, "auto") == 0) o.groups = 0;
+            else status = pliant_option_integer("--groups", optarg, 1, INT32_MAX, &o.groups, err);
             break;
         case OPTION_ORDER: status = pliant_option_integer("--order", optarg, 1, 2, &o.order, err); break;
         case OPTION_SOLVER:

@@ -86,6 +86,7 @@ typedef struct pliant_options {
     double growth;                 // of tetrahedra inwards, 1 to 2
     int32_t order;                 // of tetrahedra, 1 or 2
     pliant_solver_choice solver;
+    int32_t groups;                // of ranks that solve together; 0: chosen
     int32_t region_count;
     pliant_region_option regions[PLIANT_REGION_LIMIT];
     pliant_material material;

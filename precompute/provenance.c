@@ -54,6 +54,7 @@ static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_op
     fprintf(out,
             "method = %s\n"
             "solver = %s\n"
+            "groups = %d\n"
             "constraint_levels = %d..%d\n"
             "asked_eps = %.9g\n"
             "asked_rms = %.9g\n"
@@ -67,7 +68,7 @@ static void print_greens(FILE *out, const pliant_run_summary *s, const pliant_op
             "seconds_solve = %.3f\n"
             "seconds_transform = %.3f\n"
             "seconds_compress = %.3f\n",
-            pliant_discretisation_of(options->method)->name, s->solver, s->levels.first, s->levels.last, options->compression.eps,
+            pliant_discretisation_of(options->method)->name, s->solver, s->groups, s->levels.first, s->levels.last, options->compression.eps,
             options->compression.rms, options->compression.max, s->detail_steps, s->detail.rms,
             s->detail.tangential_rms, s->residual, s->times.assemble, s->times.factor,
             s->times.solve, s->times.transform, s->times.compress);

@@ -94,7 +94,7 @@ static PetscErrorCode refine(pliant_greens *g, const refiner *r, pliant_error *e
         pliant_status status = PLIANT_OK;
         for (int owner = 0; owner < size; owner++) {
             int32_t begin, end;
-            pliant_greens_share(g, columns, batch, owner, size, &begin, &end);
+            pliant_greens_share(g, columns, batch, owner, &begin, &end);
             for (int32_t first = begin; first < end; first += group) {
                 const int32_t count = end - first < group ? end - first : group;
                 add_up(r, first, count);

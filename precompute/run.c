@@ -89,6 +89,7 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     const pliant_level_range levels = p->levels;
     const int32_t solved = pliant_right_hand_count(p, options->blocks);
     summary->solver = plan->solver;
+    summary->groups = plan->groups;
     const int all = options->blocks == PLIANT_BLOCKS_ALL;
     const double rows = all ? p->vertex_count : p->free_count;
     double stored = 0;  // columns of all levels
@@ -115,11 +116,13 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     char output_folder[4096];
     folder_of(options->output, output_folder, sizeof output_folder);
 
+    char dealt[48] = "";
+    if (summary->groups > 1) snprintf(dealt, sizeof dealt, ", in %d groups", summary->groups);
     pliant_progress_note(progress,
                          "%d vertices in %d level%s, %d free and %d held; %s on "
-                         "%d rank%s (%s)",
+                         "%d rank%s (%s%s)",
                          p->vertex_count, p->multires->level_count, p->multires->level_count == 1 ? "" : "s",
-                         p->free_count, p->fixed_count, plan->system, size, size == 1 ? "" : "s", plan->solver);
+                         p->free_count, p->fixed_count, plan->system, size, size == 1 ? "" : "s", plan->solver, dealt);
     if (levels.last < p->multires->level_count - 1)
         pliant_progress_note(progress,
                              "columns of levels %d..%d: %d are solved for instead of %.0f",
@@ -359,7 +362,8 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     if (!is_whole) PetscCall(make_system(comm, progress, s, h, err));
 
     work_in_hand(h);
-    PetscCall(pliant_greens_create(comm, p, options, folder, h->partial, &h->greens, err));
+    PetscCall(pliant_greens_create(h->method->groups(h->system), p, options, folder, h->partial,
+                                   &h->greens, err));
     if (options->dense)
         PetscCall(pliant_dense_output_create(comm, options->dense, p, options->blocks, &h->dense, err));
     PetscCall(pliant_greens_solve(h->greens, h->method, h->system, h->dense, progress, err));
@@ -432,7 +436,12 @@ PetscErrorCode pliant_run(MPI_Comm comm, const pliant_options *options, const ch
         summary->was_finished = pliant_partial_was_finished(options->output);
     PetscCallMPI(MPI_Bcast(&summary->was_finished, 1, MPI_INT, 0, comm));
     if (summary->was_finished) PetscFunctionReturn(0);
-    if (rank == 0) {
+    if (options->groups > summary->ranks) {
+        summary->misused = 1;
+        status = pliant_error_set(err, PLIANT_ERR_ARGUMENT,
+                                  "--groups: expected at most the %d rank%s, found %d",
+                                  summary->ranks, summary->ranks == 1 ? "" : "s", options->groups);
+    } else if (rank == 0) {
         status = check_output(options->output, options->existing, err);
         if (status == PLIANT_OK && options->dense) status = check_output(options->dense, options->existing, err);
         if (status == PLIANT_OK && options->product == PLIANT_PRODUCT_MESH)

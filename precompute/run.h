@@ -16,7 +16,8 @@ typedef struct pliant_run_summary {
     pliant_relief_size detail;
     pliant_lattice_summary lattice;  // 0 cells without --lattice; on the first rank
     pliant_remesh_report remesh;   // 0 base vertices without --remesh; on the first rank
-    const char *solver;            // "node" or "scalapack"
+    const char *solver;            // "node", "scalapack", "direct" or "multigrid"
+    int32_t groups;                // of ranks, that solve together
     double volume, residual, memory_bytes, file_bytes;
     pliant_level_range levels;  // stored
     int32_t column_counts[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];

@@ -25,16 +25,15 @@
 // Poisson's ratio of 0.499; multigrid stops at 1e-9.
 static const double residual_bound = 1e-7;
 
-// Columns (of three right-hand sides) that are solved for together.
-enum { block_columns = 64 };
-
 typedef struct fem_system {
-    MPI_Comm comm;
+    MPI_Comm comm;  // all ranks
     PetscMPIInt rank, size;
-    MPI_Comm group;  // the ranks that solve together: all, or each for itself
+    pliant_solver_groups groups;
     const pliant_problem *problem;
     const pliant_options *options;
     int32_t free_columns, batch;
+    int32_t block;        // columns (of three right-hand sides) that are solved for together
+    int32_t group_batch;  // the most columns of a batch that a group has
     pliant_tetrahedra *tetrahedra;
     pliant_material materials[PLIANT_REGION_LIMIT + 1];  // by region
     double free_nodes, rim_estimate;
@@ -42,8 +41,8 @@ typedef struct fem_system {
     pliant_stiffness *stiffness;
     pliant_fem_solver *solver;
     pliant_reaction *reaction;
-    double
-        *surface;  // [batch][3][3n]: this rank's part of the columns; then its share of them, whole
+    // [group_batch][3][3n]: this rank's part of its group's columns; then its share of them, whole
+    double *surface;
     double worst;
 } fem_system;
 
@@ -109,30 +108,45 @@ static double matrix_bytes(const fem_system *s)
            (sizeof(double) + sizeof(PetscInt));
 }
 
-// Of the memory available, for every rank's own factors.
-static const double replica_part = 0.5;
+// Of the memory available, for all the factors on a machine.
+static const double replica_part = 0.6;
 
-// Collective: ranks that each factor the whole system need not talk while they solve, which is
-// where the time goes: 1605 right-hand sides at 16600 unknowns took 5.6 s on one rank and 80 s on
-// two together, on a machine with other work. So they do while that fits. -pliant_fem_together
-// overrules.
-static PetscErrorCode choose_group(fem_system *s, double available)
+// Collective: would every machine hold its ranks' parts of their groups' factors?
+static PetscErrorCode find_fit(const fem_system *s, const pliant_solver_groups *groups, int *fits)
 {
     PetscFunctionBegin;
-    PetscMPIInt here, most;
-    PetscCall(pliant_node_size(s->comm, &here));
-    PetscCallMPI(MPI_Allreduce(&here, &most, 1, MPI_INT, MPI_MAX, s->comm));
-    const double all = (s->planned.bytes + matrix_bytes(s)) * most;
-    PetscBool together = s->size == 1 || s->planned.kind != PLIANT_SOLVER_DIRECT ||
-                         (available > 0 && all > replica_part * available);
-    PetscCall(PetscOptionsGetBool(NULL, NULL, "-pliant_fem_together", &together, NULL));
-    s->group = together ? s->comm : PETSC_COMM_SELF;
+    MPI_Comm machine;
+    PetscCallMPI(MPI_Comm_split_type(s->comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine));
+    const double own = (s->planned.bytes + matrix_bytes(s)) / groups->size,
+                 available = pliant_node_available();
+    double here;
+    PetscCallMPI(MPI_Allreduce(&own, &here, 1, MPI_DOUBLE, MPI_SUM, machine));
+    PetscCallMPI(MPI_Comm_free(&machine));
+    const int mine = available <= 0 || here <= replica_part * available;
+    PetscCallMPI(MPI_Allreduce(&mine, fits, 1, MPI_INT, MPI_MIN, s->comm));
     PetscFunctionReturn(0);
 }
 
-static int is_replicated(const fem_system *s)
+// Collective: ranks that solve by themselves need not talk while they solve, which is where the
+// time goes (1605 right-hand sides at 16600 unknowns took 5.6 s on one rank and 80 s on two
+// together, on a machine with other work). So there are as many groups as fit into memory: of one
+// rank, of two, of four, ..., of all. Multigrid is for what does not fit even once.
+static PetscErrorCode choose_groups(fem_system *s)
 {
-    return s->size > 1 && s->group == PETSC_COMM_SELF;
+    PetscFunctionBegin;
+    int count = s->options->groups > 0                    ? s->options->groups
+                : s->planned.kind == PLIANT_SOLVER_DIRECT ? s->size
+                                                          : 1;
+    for (int fits = 0;; count /= 2) {
+        PetscCall(pliant_solver_groups_create(s->comm, count, &s->groups));
+        if (count == 1 || s->options->groups > 0) break;
+        PetscCall(find_fit(s, &s->groups, &fits));
+        if (fits) break;
+        PetscCall(pliant_solver_groups_destroy(&s->groups));
+    }
+    s->group_batch = pliant_solver_groups_most(&s->groups, s->batch);
+    s->block = pliant_fem_solver_block(s->planned.kind, s->groups.size) / 3;
+    PetscFunctionReturn(0);
 }
 
 static PetscErrorCode create(MPI_Comm comm, const pliant_problem *problem,
@@ -174,7 +188,7 @@ static PetscErrorCode create(MPI_Comm comm, const pliant_problem *problem,
     PetscCallMPI(MPI_Allreduce(&available, &least, 1, MPI_DOUBLE, MPI_MIN, comm));
     s->planned = pliant_fem_solver_choose(options->solver, 3 * s->free_nodes,
                                           9 * s->free_nodes * row_blocks(t->order), least);
-    PetscCall(choose_group(s, least));
+    PetscCall(choose_groups(s));
     PetscFunctionReturn(0);
 }
 
@@ -188,6 +202,7 @@ static PetscErrorCode destroy(void **system)
     PetscCall(pliant_fem_solver_destroy(&s->solver));
     PetscCall(pliant_stiffness_destroy(&s->stiffness));
     pliant_tetrahedra_destroy(s->tetrahedra);
+    PetscCall(pliant_solver_groups_destroy(&s->groups));
     PetscCall(PetscFree(*system));
     PetscFunctionReturn(0);
 }
@@ -202,14 +217,20 @@ static PetscErrorCode plan(const void *system, pliant_solve_plan *out)
     const double mesh = (24.0 + 8) * t->node_count + 4.0 * (t->tet_nodes + 1) * t->tet_count;
     *out = (pliant_solve_plan){
         .solver = pliant_fem_solver_name(s->planned.kind),
-        .matrix_bytes = matrix * (is_replicated(s) ? s->size : 1) + (mesh + responses) * s->size,
+        .groups = s->groups.count,
+        .matrix_bytes = matrix * s->groups.count + (mesh + responses) * s->size,
         // Every rank has its part of a batch's columns at the surface.
-        .batch_bytes = 8 * (9.0 * s->problem->vertex_count * s->batch * s->size +
-                            4 * unknowns * 3 * block_columns * (is_replicated(s) ? s->size : 1))};
-    snprintf(out->system, sizeof out->system, "about %.0f unknowns in %d %s tetrahedra%s", unknowns,
-             t->tet_count, t->order == 1 ? "linear" : "quadratic",
-             is_replicated(s) ? ", factored by each rank for itself," : "");
+        .batch_bytes = 8 * (9.0 * s->problem->vertex_count * s->group_batch * s->size +
+                            4 * unknowns * 3 * s->block * s->groups.count)};
+    snprintf(out->system, sizeof out->system, "about %.0f unknowns in %d %s tetrahedra", unknowns,
+             t->tet_count, t->order == 1 ? "linear" : "quadratic");
     PetscFunctionReturn(0);
+}
+
+static const pliant_solver_groups *groups(const void *system)
+{
+    const fem_system *s = system;
+    return &s->groups;
 }
 
 // ---- Assembly ----
@@ -225,12 +246,10 @@ static PetscErrorCode assemble(void *system, pliant_progress *progress, pliant_e
         status = pliant_material_check(&s->materials[k], err);
     PliantCall(s->comm, status, err);
     const pliant_stiffness_def def = {s->tetrahedra, s->materials, p->held};
-    // A rank for itself may be refused alone.
-    const PetscErrorCode code = pliant_stiffness_create(s->group, &def, &s->stiffness, err);
-    if (code != PLIANT_REFUSED) PetscCall(code);
-    PliantCall(s->comm, code == PLIANT_REFUSED ? PLIANT_ERR_MEMORY : PLIANT_OK, err);
+    PetscCall(pliant_solver_groups_agree(
+        &s->groups, pliant_stiffness_create(s->groups.comm, &def, &s->stiffness, err), err));
     PetscCall(pliant_reaction_create(s->tetrahedra, p->held, &s->reaction));
-    PetscCall(PetscMalloc1((size_t)s->batch * 9 * (size_t)p->vertex_count, &s->surface));
+    PetscCall(PetscMalloc1((size_t)s->group_batch * 9 * (size_t)p->vertex_count, &s->surface));
     PetscFunctionReturn(0);
 }
 
@@ -362,8 +381,8 @@ static PetscErrorCode solve_block(fem_system *s, const hat *hats, int32_t count,
     double *right;
     const double *solution;
     int converged;
-    PetscCall(MatCreateDense(s->group, (PetscInt)own, PETSC_DECIDE, PETSC_DETERMINE, 3 * count,
-                             NULL, &B));
+    PetscCall(MatCreateDense(s->groups.comm, (PetscInt)own, PETSC_DECIDE, PETSC_DETERMINE,
+                             3 * count, NULL, &B));
     PetscCall(MatDuplicate(B, MAT_DO_NOT_COPY_VALUES, &X));
     PetscCall(MatDenseGetArrayWrite(B, &right));
     for (int32_t k = 0; k < count; k++) fill_right(s, &hats[k], right + 3 * (size_t)k * own, own);
@@ -398,14 +417,14 @@ static PetscErrorCode solve_rim(fem_system *s, pliant_error *err)
     const int32_t rim_count = s->reaction->rim_count;
     double *responses;
     PetscCall(PetscCalloc1(3 * (size_t)rim_count * rows + 1, &responses));
-    // Ranks for themselves take every size-th block.
+    // Groups take turns.
     pliant_status status = PLIANT_OK;
     PetscErrorCode code = 0;
-    for (int32_t first = 0, turn = 0; first < rim_count && code == 0;
-         first += block_columns, turn++) {
-        if (is_replicated(s) && turn % s->size != s->rank) continue;
-        const int32_t count = rim_count - first < block_columns ? rim_count - first : block_columns;
-        hat hats[block_columns];
+    for (int32_t first = 0, turn = 0; first < rim_count && code == 0; first += s->block, turn++) {
+        if (turn % s->groups.count != s->groups.index) continue;
+        const int32_t count = rim_count - first < s->block ? rim_count - first : s->block;
+        hat *hats;
+        PetscCall(PetscMalloc1(count, &hats));
         for (int32_t k = 0; k < count; k++)
             hats[k] = (hat){.count = 1,
                             .position = &self,
@@ -413,6 +432,7 @@ static PetscErrorCode solve_rim(fem_system *s, pliant_error *err)
                             .nodes = s->reaction->rim + first + k,
                             .kind = HAT_RIM};
         code = solve_block(s, hats, count, responses + 3 * (size_t)first * rows, &status, err);
+        PetscCall(PetscFree(hats));
     }
     if (code == 0) code = pliant_refusal_agree(s->comm, status, err);
     for (int32_t k = 0; k < rim_count && code == 0; k++)
@@ -429,6 +449,11 @@ static PetscErrorCode factor(void *system, pliant_progress *progress, pliant_err
     PetscFunctionBegin;
     fem_system *s = system;
     pliant_progress_begin(progress, "factor", 0);
+    // One thread a rank: ranks that each took all cores would be in each other's way (four times as
+    // slow, two ranks on two cores).
+    pliant_node_threads(1);
+    // The blocks of right-hand sides and solutions, and CHOLMOD's three copies of them.
+    pliant_node_keep_heap(s->planned.bytes + 6 * 8.0 * 3 * s->free_nodes * 3 * s->block);
     int singular;
     PetscCall(pliant_fem_solver_create(s->planned.kind, s->stiffness->K, s->stiffness->coordinates,
                                        &s->solver, &singular));
@@ -450,28 +475,30 @@ static PetscErrorCode solve_hats(fem_system *s, const hat *hats, int32_t count,
 {
     PetscFunctionBegin;
     const size_t rows = 3 * (size_t)s->problem->vertex_count;
-    *share = (pliant_column_share){.begin = pliant_column_split(count, s->rank, s->size),
-                                   .end = pliant_column_split(count, s->rank + 1, s->size),
-                                   .ld = rows};
-    const int32_t begin = is_replicated(s) ? share->begin : 0,
-                  end = is_replicated(s) ? share->end : count;
+    *share = (pliant_column_share){.ld = rows};
+    pliant_solver_groups_share(&s->groups, count, s->rank, &share->begin, &share->end);
+    int32_t begin, end;
+    pliant_solver_groups_part(&s->groups, count, s->groups.index, &begin, &end);
     pliant_status status = PLIANT_OK;
-    for (int32_t first = begin; first < end; first += block_columns) {
-        const int32_t size = end - first < block_columns ? end - first : block_columns;
-        PetscCall(solve_block(s, hats + first, size, s->surface + 3 * (size_t)first * rows, &status,
-                              err));
+    for (int32_t first = begin; first < end; first += s->block) {
+        const int32_t size = end - first < s->block ? end - first : s->block;
+        PetscCall(solve_block(s, hats + first, size,
+                              s->surface + 3 * (size_t)(first - begin) * rows, &status, err));
     }
     PliantCall(s->comm, status, err);
-    double *own = s->surface + 3 * (size_t)share->begin * rows;
+    double *own = s->surface + 3 * (size_t)(share->begin - begin) * rows;
     share->columns = own;
     // A column at a time: counts stay far below MPI's limits.
-    for (int owner = 0; owner < s->size && s->size > 1 && !is_replicated(s); owner++)
-        for (int32_t k = pliant_column_split(count, owner, s->size);
-             k < pliant_column_split(count, owner + 1, s->size); k++) {
-            double *column = s->surface + 3 * (size_t)k * rows;
-            PetscCallMPI(MPI_Reduce(s->rank == owner ? MPI_IN_PLACE : column, column,
-                                    (int)(3 * rows), MPI_DOUBLE, MPI_SUM, owner, s->comm));
+    for (int member = 0; member < s->groups.size && s->groups.size > 1; member++) {
+        int32_t from, to;
+        pliant_solver_groups_share(&s->groups, count, s->groups.first[s->groups.index] + member,
+                                   &from, &to);
+        for (int32_t k = from; k < to; k++) {
+            double *column = s->surface + 3 * (size_t)(k - begin) * rows;
+            PetscCallMPI(MPI_Reduce(s->groups.rank == member ? MPI_IN_PLACE : column, column,
+                                    (int)(3 * rows), MPI_DOUBLE, MPI_SUM, member, s->groups.comm));
         }
+    }
     for (int32_t k = share->begin; k < share->end; k++)
         PetscCall(add_direct(s, &hats[k], own + 3 * (size_t)(k - share->begin) * rows));
     PetscCall(pliant_reaction_finish(s->reaction, 3 * (share->end - share->begin), own));
@@ -515,6 +542,7 @@ const pliant_discretisation pliant_fem_system = {
     .name = "fem",
     .create = create,
     .plan = plan,
+    .groups = groups,
     .assemble = assemble,
     .factor = factor,
     .solve = solve,

@@ -1,6 +1,7 @@
 // solver.h: K X = B for blocks of right-hand sides: rows of a table of two.
 //
-//   direct     MUMPS: sparse Cholesky, blocks of right-hand sides at once
+//   direct     sparse Cholesky, blocks of right-hand sides at once: CHOLMOD on one rank, MUMPS on
+//              several
 //   multigrid  conjugate gradients with smoothed aggregation (PETSc's GAMG) that knows the rigid
 //   motions
 #pragma once
@@ -19,6 +20,8 @@ typedef struct pliant_fem_solver_plan {
 // From the number of unknowns and of blocks in K, and the memory that there is.
 pliant_fem_solver_plan pliant_fem_solver_choose(pliant_solver_choice asked, double unknowns,
                                                 double nonzeros, double available);
+// How many right-hand sides are best solved for at once, by a group of so many ranks.
+int32_t pliant_fem_solver_block(pliant_solver_choice kind, int ranks);
 const char *pliant_fem_solver_name(pliant_solver_choice kind);
 
 // Collective. K is referenced. *singular is 1 when there is no factorization: K is not positive

@@ -4,8 +4,7 @@
 // PLIANT_KILLS=50 kills fifty runs at random moments in place of six.
 #include "check.h"
 #include "command.h"
-
-#include "pliant/reader.h"
+#include "model_files.h"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -49,63 +48,6 @@ static long size_of(const char *path, const char *ending)
     struct stat found;
     snprintf(whole, sizeof whole, "%s%s", path, ending);
     return stat(whole, &found) == 0 ? (long)found.st_size : 0;
-}
-
-// Lines of the provenance that two runs of the same thing may not share.
-static int may_differ(const char *line)
-{
-    return strncmp(line, "seconds_", 8) == 0 || strncmp(line, "command_line", 12) == 0;
-}
-
-static void same_provenance(const pliant_section *a, const pliant_section *b)
-{
-    const char *p = a->data, *q = b->data, *p_end = p + a->bytes, *q_end = q + b->bytes;
-    while (p < p_end && q < q_end && *p != '\n' && *q != '\n') {
-        const int p_size = (int)strcspn(p, "\n"), q_size = (int)strcspn(q, "\n");
-        if (!may_differ(p) && (p_size != q_size || strncmp(p, q, (size_t)p_size) != 0))
-            fail_msg("provenance: '%.*s' against '%.*s'", p_size, p, q_size, q);
-        p += p_size + 1;
-        q += q_size + 1;
-    }
-}
-
-// The same sections with the same bytes; the provenance but for times and the command line. With a
-// tolerance: floats that near, relative to the largest of the section, and the provenance is not
-// read.
-static void same_model(const char *found, const char *expected, double tolerance)
-{
-    pliant_reader *a = NULL, *b = NULL;
-    pliant_error err;
-    check_ok(pliant_reader_open(found, &a, &err), &err);
-    check_ok(pliant_reader_open(expected, &b, &err), &err);
-    check_ok(pliant_reader_verify(a, &err), &err);
-    assert_int_equal(pliant_reader_section_count(a), pliant_reader_section_count(b));
-    for (int32_t i = 0; i < pliant_reader_section_count(a); i++) {
-        const pliant_section *s = pliant_reader_section(a, i), *t = pliant_reader_section(b, i);
-        assert_string_equal(s->path, t->path);
-        if (strcmp(s->path, "/provenance/text") == 0) {
-            if (tolerance == 0) same_provenance(s, t);
-            continue;
-        }
-        if (s->bytes != t->bytes)
-            fail_msg("%s: %llu bytes against %llu", s->path, (unsigned long long)s->bytes,
-                     (unsigned long long)t->bytes);
-        if (memcmp(s->data, t->data, s->bytes) == 0) continue;
-        if (tolerance == 0) fail_msg("%s: other bytes", s->path);
-        if (!strstr(s->path, "block") && !strstr(s->path, "gravity")) {
-            if (!strstr(s->path, "summary")) fail_msg("%s: other bytes", s->path);
-            continue;
-        }
-        const float *x = s->data, *y = t->data;
-        double largest = 0, off = 0;
-        for (uint64_t k = 0; k < s->count; k++) {
-            largest = fmax(largest, fabs((double)y[k]));
-            off = fmax(off, fabs((double)x[k] - (double)y[k]));
-        }
-        check_at_most(off / largest, tolerance);
-    }
-    pliant_reader_close(b);
-    pliant_reader_close(a);
 }
 
 // ---- Runs that end early ----
@@ -309,13 +251,13 @@ static void runs_killed_at_any_moment_resume_to_the_uninterrupted_file(void **st
             }
         }
         // Whatever has its name is whole.
-        if (exists(l.output, "")) same_model(l.output, whole.output, 0);
+        if (exists(l.output, "")) check_same_model(l.output, whole.output, 0);
         resume(&c, &l, "--resume");
         // Killed at its very last steps: there is nothing left to do.
         if (c.status == 1) check_one_line(&c, name, "exists already");
         else assert_int_equal(c.status, 0);
         assert_false(exists(l.output, ".partial"));
-        same_model(l.output, whole.output, 0);
+        check_same_model(l.output, whole.output, 0);
     }
     print_message("%d kills: %d with columns in the journal, %d after the output had its name; %d "
                   "runs came to their "
@@ -334,7 +276,7 @@ static void another_number_of_ranks_goes_on(void **state)
         leave_after(&l, 12);
         l.ranks = 3 - ranks;
         must_resume(&l);
-        same_model(l.output, whole.output, 1e-5);
+        check_same_model(l.output, whole.output, 1e-5);
     }
 }
 
@@ -366,8 +308,8 @@ static void signals_finish_the_batch_and_say_how_to_go_on(void **state)
         assert_false(exists(l.output, "") || exists(l.output, ".tmp"));
         assert_true(exists(l.output, ".partial/journal"));
         must_resume(&l);
-        if (l.ranks == 0) same_model(l.output, whole.output, 0);
-        else same_model(l.output, whole.output, 1e-5);
+        if (l.ranks == 0) check_same_model(l.output, whole.output, 0);
+        else check_same_model(l.output, whole.output, 1e-5);
     }
     // mpirun's own way with a Ctrl-C: SIGTERM for the ranks, SIGKILL a second later, status 1.
     const launch l = {.ranks = 2, .options = whole.options, .output = in_folder("signalled.h5")};
@@ -379,7 +321,7 @@ static void signals_finish_the_batch_and_say_how_to_go_on(void **state)
     assert_int_not_equal(wait_for(child), 0);
     // It may have been so near its end that it could reach it.
     if (!exists(l.output, "")) must_resume(&l);
-    same_model(l.output, whole.output, 1e-5);
+    check_same_model(l.output, whole.output, 1e-5);
 }
 
 static void a_second_signal_ends_at_once(void **state)
@@ -422,7 +364,7 @@ static void a_remeshed_model_resumes(void **state)
     assert_int_equal(c.status, 1);
     check_one_line(&c, name, "--remesh");
     must_resume(&l);
-    same_model(l.output, whole.output, 0);
+    check_same_model(l.output, whole.output, 0);
 }
 
 static void what_was_changed_is_refused_by_name(void **state)
@@ -464,7 +406,7 @@ static void what_was_changed_is_refused_by_name(void **state)
     // None of that did any harm.
     const launch same = {.options = l.options, .output = in_folder("changed3.h5")};
     must_resume(&same);
-    same_model(same.output, whole.output, 0);
+    check_same_model(same.output, whole.output, 0);
 }
 
 static void a_second_run_is_refused(void **state)
@@ -539,7 +481,7 @@ static void a_full_disk_keeps_what_is_done(void **state)
     }
     must_resume(&l);
     // The limit is one of shared memory, too, so that these runs have factored by ScaLAPACK.
-    same_model(l.output, whole.output, 1e-5);
+    check_same_model(l.output, whole.output, 1e-5);
     // No room for anything: nothing is left behind.
     check_run(&c, "mpirun --quiet -n 1 sh -c \"ulimit -f 0; exec %s --force\"", line);
     assert_int_equal(c.status, 1);
@@ -581,7 +523,7 @@ static void damaged_columns_are_solved_again(void **state)
     assert_int_equal(c.status, 0);
     assert_non_null(strstr(c.errors, "columns are damaged and will be solved again"));
     assert_non_null(strstr(c.errors, "goes on with "));
-    same_model(l.output, whole.output, 0);
+    check_same_model(l.output, whole.output, 0);
     // A journal that is none.
     check_run(&c, "mkdir %s.partial; rm %s; echo 'my notes' > %s.partial/journal", l.output,
               l.output, l.output);
