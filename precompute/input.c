@@ -15,6 +15,9 @@
 static const double detail_bytes = 1200;
 // Positions, faces, twins and parents of a vertex while it is made, embedded and written.
 static const double plain_bytes = 400;
+// Of one with finite elements, at the least: the matrix of linear ones. The plan of memory, which
+// comes when the inside is there, knows better.
+static const double element_bytes = 4000;
 
 // A deep subdivision is refused before it is made: by the dense system of its vertices, or, where
 // none is solved, by the vertices themselves.
@@ -34,13 +37,14 @@ static pliant_status check_size(const pliant_mesh *base, const pliant_options *o
             "memory (%.1f GB are available here): use fewer levels",
             options->subdivide, options->detail, detailed, detailed * detail_bytes / 1e9,
             available / 1e9);
-    if (options->greens == PLIANT_GREENS_NONE) {
-        if (available <= 0 || vertices * plain_bytes <= available) return PLIANT_OK;
+    if (options->greens == PLIANT_GREENS_NONE || options->method == PLIANT_METHOD_FEM) {
+        const double bytes = options->greens == PLIANT_GREENS_NONE ? plain_bytes : element_bytes;
+        if (available <= 0 || vertices * bytes <= available) return PLIANT_OK;
         return pliant_error_set(
             err, PLIANT_ERR_MEMORY,
             "--subdivide %d: makes %.3g vertices, which need %.3g GB of memory (%.1f GB "
             "are available here): use fewer levels",
-            options->subdivide, vertices, vertices * plain_bytes / 1e9, available / 1e9);
+            options->subdivide, vertices, vertices * bytes / 1e9, available / 1e9);
     }
     if (available <= 0 || needed <= 64 * available) return PLIANT_OK;
     return pliant_error_set(
