@@ -42,6 +42,11 @@ static void print_text_remesh(const pliant_remesh_report *r)
            r->fit.normal_mean, r->fit.normal_largest, r->fit.fold, r->fit.flipped_count);
 }
 
+static double rate(double flops, double seconds)
+{
+    return seconds > 0 ? flops / seconds / 1e9 : 0;
+}
+
 static void print_text(const pliant_options *options, const pliant_run_summary *s)
 {
     const pliant_run_times *t = &s->times;
@@ -77,9 +82,14 @@ static void print_text(const pliant_options *options, const pliant_run_summary *
                    (unsigned long long)r->kept, (unsigned long long)r->dense, factor(r), r->rms, r->max);
         }
     if (options->lattice_cells > 0) print_text_lattice(&s->lattice);
-    printf("  seconds      read %.2f, lattice %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
+    printf("  memory       planned %.3g GB, at most used %.3g GB\n", s->memory_bytes / 1e9,
+           s->peak_memory_bytes / 1e9);
+    if (s->factor_flops > 0)
+        printf("  GFLOP/s      factor %.1f, solve %.1f\n", rate(s->factor_flops, t->factor),
+               rate(s->solve_flops, t->solve));
+    printf("  seconds      read %.2f, lattice %.2f, inside %.2f, assemble %.2f, factor %.2f, solve %.2f, transform %.2f, compress "
            "%.2f, write %.2f, total %.2f\n",
-           t->read, t->lattice, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+           t->read, t->lattice, t->inside, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
 }
 
 static void print_json_text(const char *text)
@@ -156,8 +166,10 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
                t->read, t->lattice, t->write, t->total);
         return;
     }
-    printf(", \"free\": %d, \"fixed\": %d, \"solver\": \"%s\", \"groups\": %d, \"residual\": %.3g, \"memory_bytes\": %.0f",
-           s->free_count, s->fixed_count, s->solver, s->groups, s->residual, s->memory_bytes);
+    printf(", \"free\": %d, \"fixed\": %d, \"solver\": \"%s\", \"groups\": %d, \"residual\": %.3g, \"memory_bytes\": %.0f"
+           ", \"peak_memory_bytes\": %.0f, \"factor_flops\": %.6g, \"solve_flops\": %.6g",
+           s->free_count, s->fixed_count, s->solver, s->groups, s->residual, s->memory_bytes,
+           s->peak_memory_bytes, s->factor_flops, s->solve_flops);
     if (s->detail_steps > 0)
         printf(", \"detail\": {\"steps\": %d, \"vertices\": %d, \"rms\": %.6g, \"largest\": %.6g, "
                "\"tangential_rms\": %.6g, \"tangential_largest\": %.6g, \"least_sine\": %.3g}",
@@ -169,9 +181,9 @@ static void print_json(const pliant_options *options, const pliant_run_summary *
         if (b > 0) printf(", ");
         print_json_block(s, (pliant_block_name)b);
     }
-    printf("}, \"seconds\": {\"read\": %.3f, \"lattice\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
+    printf("}, \"seconds\": {\"read\": %.3f, \"lattice\": %.3f, \"inside\": %.3f, \"assemble\": %.3f, \"factor\": %.3f, \"solve\": %.3f, "
            "\"transform\": %.3f, \"compress\": %.3f, \"write\": %.3f, \"total\": %.3f}}\n",
-           t->read, t->lattice, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
+           t->read, t->lattice, t->inside, t->assemble, t->factor, t->solve, t->transform, t->compress, t->write, t->total);
 }
 
 // The command line as one would type it again, on one line.

@@ -4,6 +4,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <malloc.h>
+#include <math.h>
 #include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -126,6 +127,24 @@ static double number_in(const char *path, const char *key)
         if (strncmp(line, key, strlen(key)) == 0 && sscanf(line + strlen(key), "%lf", &value) == 1) break;
     fclose(file);
     return value;
+}
+
+PetscErrorCode pliant_node_peak(MPI_Comm comm, double *bytes)
+{
+    PetscFunctionBegin;
+    const double most = number_in("/proc/self/status", "VmHWM:"),
+                 shared = number_in("/proc/self/status", "RssShmem:");
+    double own = 1024 * (fmax(most, 0) - fmax(shared, 0)), here = 1024 * fmax(shared, 0), once;
+    PetscMPIInt rank;
+    MPI_Comm node;
+    PetscCallMPI(MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
+    PetscCallMPI(MPI_Comm_rank(node, &rank));
+    // Every rank sees all of it in the end, or the part that it has touched.
+    PetscCallMPI(MPI_Allreduce(&here, &once, 1, MPI_DOUBLE, MPI_MAX, node));
+    PetscCallMPI(MPI_Comm_free(&node));
+    if (rank == 0) own += once;
+    PetscCallMPI(MPI_Allreduce(&own, bytes, 1, MPI_DOUBLE, MPI_SUM, comm));
+    PetscFunctionReturn(0);
 }
 
 double pliant_node_available(void)

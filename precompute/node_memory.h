@@ -34,6 +34,10 @@ void pliant_node_keep_heap(double bytes);
 // Collective: the number of comm's ranks on this machine.
 PetscErrorCode pliant_node_size(MPI_Comm comm, PetscMPIInt *size);
 
+// Collective: the most memory that comm's ranks have had, all together, with what they share counted
+// once a machine as it is now: to be asked while it is still there. 0 where the system does not tell.
+PetscErrorCode pliant_node_peak(MPI_Comm comm, double *bytes);
+
 // Bytes that this machine can still give: MemAvailable, or less where the control group says so;
 // PETSC_OPTIONS="-pliant_memory GB" overrules.
 double pliant_node_available(void);

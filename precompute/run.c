@@ -74,6 +74,9 @@ static pliant_status check_levels(const pliant_problem *p, const pliant_options 
     return PLIANT_OK;
 }
 
+// A rank that does nothing yet: measured, most of it libraries.
+static const double process_bytes = 48e6;
+
 // Collective: state what the run will take, and refuse what cannot fit.
 static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
                                   const pliant_options *options, const pliant_solve_plan *plan,
@@ -100,7 +103,8 @@ static PetscErrorCode plan_memory(MPI_Comm comm, const pliant_problem *p,
     const double work = 5.0 * rows * 9 * PLIANT_COLUMN_GROUP * sizeof(double) * (all ? 2 : 1) * size;
     // What is kept, at the smallest compression seen in practice (GF 10.2: 8 at eps 0.01).
     const double kept = rows * stored * 40 / 6;
-    const double needed = plan->matrix_bytes + plan->right_hand_bytes + plan->batch_bytes + work + kept;
+    const double needed = plan->matrix_bytes + plan->right_hand_bytes + plan->batch_bytes + work +
+                          kept + process_bytes * size;
     summary->memory_bytes = needed;
     const double here = needed * node_size / size, available = pliant_node_available();
     // On disk: the columns that are solved for, kept until the output is there, and coarser ones.
@@ -231,6 +235,19 @@ static PetscErrorCode open_partial(MPI_Comm comm, const pliant_options *options,
     PetscFunctionReturn(0);
 }
 
+// Collective: the operations that PETSc has counted since `*before`, of all ranks; *before becomes
+// now.
+static PetscErrorCode count_flops(MPI_Comm comm, PetscLogDouble *before, double *flops)
+{
+    PetscFunctionBegin;
+    PetscLogDouble now;
+    PetscCall(PetscGetFlops(&now));
+    const double mine = now - *before;
+    *before = now;
+    PetscCallMPI(MPI_Allreduce(&mine, flops, 1, MPI_DOUBLE, MPI_SUM, comm));
+    PetscFunctionReturn(0);
+}
+
 // Collective: the columns' system, assembled and factored.
 static PetscErrorCode make_system(MPI_Comm comm, pliant_progress *progress, pliant_run_summary *s,
                                   held *h, pliant_error *err)
@@ -241,8 +258,11 @@ static PetscErrorCode make_system(MPI_Comm comm, pliant_progress *progress, plia
     PetscCallMPI(MPI_Barrier(comm));
     s->times.assemble = pliant_progress_end(progress);
     PetscCall(nothing_in_hand(comm, h, err));
+    PetscLogDouble flops;
+    PetscCall(PetscGetFlops(&flops));
     PetscCall(h->method->factor(h->system, progress, err));
     s->times.factor = pliant_progress_end(progress);
+    PetscCall(count_flops(comm, &flops, &s->factor_flops));
     PetscFunctionReturn(0);
 }
 
@@ -353,7 +373,9 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
     spool_folder(options->output, folder, sizeof folder);
     PetscCall(open_partial(comm, options, progress, h, err));
     h->method = pliant_discretisation_of(options->method);
+    const double begin = pliant_progress_clock();
     PetscCall(h->method->create(comm, p, options, pliant_greens_batch(comm), progress, &h->system, err));
+    s->times.inside = pliant_progress_clock() - begin;
     pliant_solve_plan plan;
     PetscCall(h->method->plan(h->system, &plan));
     const int is_whole = h->partial && pliant_partial_is_whole(h->partial);
@@ -366,10 +388,14 @@ static PetscErrorCode work(MPI_Comm comm, const pliant_options *options, const c
                                    &h->greens, err));
     if (options->dense)
         PetscCall(pliant_dense_output_create(comm, options->dense, p, options->blocks, &h->dense, err));
+    PetscLogDouble flops;
+    PetscCall(PetscGetFlops(&flops));
     PetscCall(pliant_greens_solve(h->greens, h->method, h->system, h->dense, progress, err));
     (void)pliant_progress_end(progress);
     s->times.solve = h->greens->solve_seconds;
     s->times.transform = h->greens->transform_seconds;
+    PetscCall(count_flops(comm, &flops, &s->solve_flops));
+    PetscCall(pliant_node_peak(comm, &s->peak_memory_bytes));
     double worst, residual_bound;
     PetscCall(h->method->residual(h->system, &worst, &residual_bound));
     s->residual = h->greens->residual;

@@ -7,7 +7,7 @@
 
 // Seconds of each phase; the order is the program's.
 typedef struct pliant_run_times {
-    double read, lattice, assemble, factor, solve, transform, compress, write, total;
+    double read, lattice, inside, assemble, factor, solve, transform, compress, write, total;
 } pliant_run_times;
 
 typedef struct pliant_run_summary {
@@ -18,7 +18,10 @@ typedef struct pliant_run_summary {
     pliant_remesh_report remesh;   // 0 base vertices without --remesh; on the first rank
     const char *solver;            // "node", "scalapack", "direct" or "multigrid"
     int32_t groups;                // of ranks, that solve together
-    double volume, residual, memory_bytes, file_bytes;
+    double volume, residual, file_bytes;
+    double memory_bytes, peak_memory_bytes;  // planned and met, all ranks together
+    double factor_flops, solve_flops;        // as PETSc and its libraries count them, all ranks
+
     pliant_level_range levels;  // stored
     int32_t column_counts[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];
     pliant_greens_result results[PLIANT_BLOCK_COUNT][PLIANT_LEVEL_LIMIT + 1];

@@ -36,7 +36,7 @@ typedef struct fem_system {
     int32_t group_batch;  // the most columns of a batch that a group has
     pliant_tetrahedra *tetrahedra;
     pliant_material materials[PLIANT_REGION_LIMIT + 1];  // by region
-    double free_nodes, rim_estimate;
+    double free_nodes;
     pliant_fem_solver_plan planned;
     pliant_stiffness *stiffness;
     pliant_fem_solver *solver;
@@ -182,11 +182,10 @@ static PetscErrorCode create(MPI_Comm comm, const pliant_problem *problem,
     // Held: every held vertex and, of quadratic elements, about three times as many midpoints.
     s->free_nodes = t->node_count - (t->order == 1 ? 1.0 : 4.0) * problem->fixed_count;
     s->free_nodes = fmax(s->free_nodes, 1);
-    // Twice what a round patch of this many vertices has at its rim.
-    s->rim_estimate = fmin(problem->fixed_count, 8 * sqrt(problem->fixed_count));
+    PetscCall(pliant_reaction_create(t, problem->held, &s->reaction));
     double available = pliant_node_available(), least;
     PetscCallMPI(MPI_Allreduce(&available, &least, 1, MPI_DOUBLE, MPI_MIN, comm));
-    s->planned = pliant_fem_solver_choose(options->solver, 3 * s->free_nodes,
+    s->planned = pliant_fem_solver_choose(options->solver, t->order, 3 * s->free_nodes,
                                           9 * s->free_nodes * row_blocks(t->order), least);
     PetscCall(choose_groups(s));
     PetscFunctionReturn(0);
@@ -207,18 +206,22 @@ static PetscErrorCode destroy(void **system)
     PetscFunctionReturn(0);
 }
 
+// gmsh's libraries, on the first rank.
+static const double gmsh_bytes = 45e6;
+
 static PetscErrorCode plan(const void *system, pliant_solve_plan *out)
 {
     PetscFunctionBegin;
     const fem_system *s = system;
     const pliant_tetrahedra *t = s->tetrahedra;
     const double unknowns = 3 * s->free_nodes, matrix = matrix_bytes(s) + s->planned.bytes;
-    const double responses = 72.0 * s->rim_estimate * s->problem->vertex_count;
+    const double responses = 72.0 * s->reaction->rim_count * s->problem->vertex_count;
     const double mesh = (24.0 + 8) * t->node_count + 4.0 * (t->tet_nodes + 1) * t->tet_count;
     *out = (pliant_solve_plan){
         .solver = pliant_fem_solver_name(s->planned.kind),
         .groups = s->groups.count,
-        .matrix_bytes = matrix * s->groups.count + (mesh + responses) * s->size,
+        .matrix_bytes = matrix * s->groups.count + (mesh + responses) * s->size +
+                        gmsh_bytes,
         // Every rank has its part of a batch's columns at the surface.
         .batch_bytes = 8 * (9.0 * s->problem->vertex_count * s->group_batch * s->size +
                             4 * unknowns * 3 * s->block * s->groups.count)};
@@ -248,7 +251,6 @@ static PetscErrorCode assemble(void *system, pliant_progress *progress, pliant_e
     const pliant_stiffness_def def = {s->tetrahedra, s->materials, p->held};
     PetscCall(pliant_solver_groups_agree(
         &s->groups, pliant_stiffness_create(s->groups.comm, &def, &s->stiffness, err), err));
-    PetscCall(pliant_reaction_create(s->tetrahedra, p->held, &s->reaction));
     PetscCall(PetscMalloc1((size_t)s->group_batch * 9 * (size_t)p->vertex_count, &s->surface));
     PetscFunctionReturn(0);
 }

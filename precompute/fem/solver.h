@@ -17,9 +17,10 @@ typedef struct pliant_fem_solver_plan {
     double bytes;               // of factors or hierarchy
 } pliant_fem_solver_plan;
 
-// From the number of unknowns and of blocks in K, and the memory that there is.
-pliant_fem_solver_plan pliant_fem_solver_choose(pliant_solver_choice asked, double unknowns,
-                                                double nonzeros, double available);
+// From the order of the elements, the number of unknowns and of entries in K, and the memory that
+// there is.
+pliant_fem_solver_plan pliant_fem_solver_choose(pliant_solver_choice asked, int order,
+                                                double unknowns, double nonzeros, double available);
 // How many right-hand sides are best solved for at once, by a group of so many ranks.
 int32_t pliant_fem_solver_block(pliant_solver_choice kind, int ranks);
 const char *pliant_fem_solver_name(pliant_solver_choice kind);
