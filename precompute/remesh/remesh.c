@@ -21,6 +21,8 @@ static const double base_step = 1.5;
 // Vertices of the finest level, where the tool chooses; of a second round, if none does.
 static const double usual_size = 12000, large_size = 26000;
 enum { AUTO_LEVEL_LIMIT = 6 };
+// So many tries in a row that were no better end the search: what cannot be met is not tried for ever.
+enum { PATIENCE = 4 };
 // Measured distances are samples: stay this much under the aim, and over the angle.
 static const double margin = 0.95;
 // A base whose mesh still misses so much after the first sweeps, in diagonals, is given up.
@@ -45,6 +47,7 @@ typedef struct work {
     pliant_remesh_report report;  // of the best
     double worst;                 // how far it is from the aims: met when at most 1
     int32_t tried_count;
+    int32_t fruitless;  // tries in a row that were no better
 } work;
 
 static void release(work *w)
@@ -109,9 +112,11 @@ static pliant_status try_base(work *w, int32_t base, int32_t levels, pliant_erro
                         PLIANT_REMESH_ANGLE / (margin * fmax(r.fit.smallest_angle, 1e-3)));
     if (r.fit.flipped_count > 0) worst = fmax(worst, 1) * (1 + r.fit.flipped_count);
     if (w->best && !(worst < w->worst)) {
+        w->fruitless++;
         pliant_cover_destroy(cover);
         return PLIANT_OK;
     }
+    w->fruitless = 0;
     pliant_cover_destroy(w->best);
     w->best = cover;
     w->worst = worst;
@@ -127,18 +132,21 @@ static int32_t deepest(const work *w, int32_t base, double size)
     return levels;
 }
 
-// From the smallest base on, until one meets the aims.
+// From the smallest base on, until one meets the aims, or several in a row are no better than those
+// before.
 static pliant_status choose(work *w, int32_t levels, pliant_error *err)
 {
     const int32_t least = pliant_coarsening_least(w->coarsening),
                   most = w->split->mesh->vertex_count;
     const double sizes[] = {usual_size, large_size};
     for (int round = 0; round < 2; round++) {
+        w->fruitless = 0;
         double base = least > FIRST_BASE ? least : most < FIRST_BASE ? most : FIRST_BASE;
         for (; base <= most; base = ceil(base_step * base)) {
             const int32_t n = (int32_t)base;
             const int32_t l = levels >= 0 ? levels : deepest(w, n, sizes[round]);
             if (finest_count(w, n, l) > sizes[round] && w->best) break;
+            if (w->fruitless >= PATIENCE) break;
             // The second round has nothing new for what the first did as deeply.
             if (round == 1 && finest_count(w, n, l) <= sizes[0]) continue;
             const pliant_status status = try_base(w, n, l, err);
