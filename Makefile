@@ -238,7 +238,7 @@ ifeq ($(BUILD),tsan)
 TEST_SRC  := $(filter-out tests/precompute/% tests/programs/%,$(TEST_SRC))
 endif
 ifneq ($(HAVE_FEM),yes)
-TEST_SRC  := $(filter-out tests/precompute/test_fem_% tests/programs/test_precompute_fem.c,$(TEST_SRC))
+TEST_SRC  := $(filter-out tests/precompute/test_fem_% $(addprefix tests/programs/test_,precompute_fem.c groups.c cluster.c),$(TEST_SRC))
 endif
 ifneq ($(HAVE_PNG),yes)
 TEST_SRC  := $(filter-out $(addprefix tests/runtime/test_,draw.c raster.c camera.c colour_map.c) tests/lattice/test_scene_drawing.c,$(TEST_SRC))
@@ -283,6 +283,10 @@ bench-lattice: $(OUT)/tests/bench/bench_lattice $(OUT)/tests/bench/bench_width  
 	@$(OUT)/tests/bench/bench_lattice
 	@mkdir -p $(FIGURES); $(OUT)/tests/bench/bench_width $(FIGURES)/width.csv
 	@scripts/plot-fastlsm $(FIGURES)/width.csv > $(FIGURES)/width.svg
+# Where precompute's time goes, and what a column costs against the number of vertices, drawn.
+bench-phases: $(OUT)/pliant-precompute  ## measure precompute's phases, scaling and libraries' share, 6 minutes
+	@scripts/phases 4 precompute/figures/columns.csv
+	@scripts/plot-phases precompute/figures/columns.csv > precompute/figures/columns.svg
 
 # libFuzzer needs clang; everything the target needs is compiled with the sanitizers.
 FUZZ_SECONDS ?= 60
@@ -326,5 +330,5 @@ install: all $(OUT)/pliant.pc  ## install under PREFIX (/usr/local), staged by D
 	install -m 644 common/include/pliant/base.h runtime/include/pliant/pliant.h $(DESTDIR)$(PREFIX)/include/pliant
 	install -m 644 $(OUT)/pliant.pc $(DESTDIR)$(PREFIX)/lib/pkgconfig
 
-.PHONY: always all runtime help configure clean tests check bench bench-lattice fuzz fuzzers headers layers format install
+.PHONY: always all runtime help configure clean tests check bench bench-lattice bench-phases fuzz fuzzers headers layers format install
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)

@@ -54,7 +54,7 @@ static const char model[] =
     "                          the rest; may be given again\n"
     "  --growth G              how fast tetrahedra grow inwards, 1 (not at all) to 2; their number "
     "goes with\n"
-    "                          that of the vertices from 1.1 on (default 1.2, linear ones 1)\n"
+    "                          that of the vertices from 1.1 on (default 1.1, linear ones 1)\n"
     "  --order 1|2             linear or quadratic tetrahedra (default 2; linear ones solve ten "
     "times as\n"
     "                          fast, but are too stiff where thin or nearly incompressible)\n"

@@ -17,7 +17,7 @@ struct pliant_size_field {
 
 double pliant_size_field_growth(int order)
 {
-    return order == 1 ? 1 : 1.2;
+    return order == 1 ? 1 : 1.1;
 }
 
 static double distance(const double *a, const double *b)

@@ -203,11 +203,12 @@ static long size_of(const char *path)
     return stat(path, &found) == 0 ? (long)found.st_size : 0;
 }
 
-// A rank's process, by the output that it is to write; the last one that was started.
+// A rank's process, by the output that it is to write; the last one that was started. mpirun's own
+// command line has the same words, but does not begin with them.
 static pid_t rank_of(const char *output)
 {
     static check_command c;
-    check_run(&c, "pgrep -f 'pliant-precompute .*%s$' | tail -n 1", output);
+    check_run(&c, "pgrep -f '^%s/pliant-precompute .*%s$' | tail -n 1", check_build(), output);
     return (pid_t)atoi(c.output);
 }
 
@@ -235,7 +236,8 @@ static void die(const char *launch, double place, death how, const char *told)
         nap(0.001);
     if (place < 0) nap(-place);
     if (how == RANK_DIES) {
-        const pid_t rank = rank_of(output);
+        pid_t rank;
+        while ((rank = rank_of(output)) == 0 && now() < limit) nap(0.01);
         if (rank > 0) kill(rank, SIGKILL);
     } else {
         snprintf(line, sizeof line, "ip -n pliant%d-1 link set eth0 down", (int)getpid());
@@ -250,8 +252,8 @@ static void die(const char *launch, double place, death how, const char *told)
     }
     if (how == HOST_VANISHES) {
         snprintf(line, sizeof line,
-                 "pkill -9 -f 'pliant-precompute .*%s$'; ip -n pliant%d-1 link set eth0 up", output,
-                 (int)getpid());
+                 "pkill -9 -f '^%s/pliant-precompute .*%s$'; ip -n pliant%d-1 link set eth0 up",
+                 check_build(), output, (int)getpid());
         (void)shell(line);
     }
     check_run(&c, "cat %s >&2", errors);

@@ -1,4 +1,4 @@
-// test_size_field.c: how long edges inside a solid should be, and that tetrahedra follow.
+// test_fem_size_field.c: how long edges inside a solid should be, and that tetrahedra follow.
 #include "check.h"
 #include "surfaces.h"
 
